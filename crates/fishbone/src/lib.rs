@@ -1,0 +1,10 @@
+//! Equilibrium shapes of thin, inextensible belts by the fishbone model.
+//!
+//! A belt is described by its centre line (the *spine*) and the straight lines across it (the *ribs*); its
+//! shape is the least bending energy under the poses of its supports. One direction of flow:
+//! [`scenario`] → [`belt`] → [`program`] → [`solver`] → [`equilibrium`] → [`surface`].
+//!
+//! Equation numbers, as in `Eq. (34)`, are those of Wakamatsu, Arai and Hirai, "Fishbone Model for Belt Object
+//! Deformation".
+
+pub mod lie;
