@@ -1,0 +1,117 @@
+//! What can be wrong with a scenario, as data and as one line for people.
+
+use thiserror::Error;
+
+/// Why a scenario is refused. Its text is one line: the field, what was found, what is allowed.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum ScenarioError {
+    /// The text is neither TOML nor JSON, or names one key twice.
+    #[error("line {line}, column {column}: {message}")]
+    Syntax {
+        /// Line of the text, from 1.
+        line: usize,
+        /// Column in that line in characters, from 1.
+        column: usize,
+        /// What the parser says of it.
+        message: String,
+    },
+    /// A field that the schema does not have.
+    #[error("{field}: unknown field, {}allowed: {}", hint(nearest), allowed.join(", "))]
+    UnknownField {
+        /// Path of the field, as in `supports[1].positon`.
+        field: String,
+        /// The field that was probably meant.
+        nearest: Option<String>,
+        /// The fields that may stand there.
+        allowed: Vec<String>,
+    },
+    /// A word outside a closed list of words.
+    #[error("{field}: found \"{found}\", allowed: {}{}", allowed.join(", "), question(nearest))]
+    UnknownChoice {
+        /// Path of the field.
+        field: String,
+        /// The word found.
+        found: String,
+        /// The word that was probably meant.
+        nearest: Option<String>,
+        /// The words that may stand there.
+        allowed: Vec<String>,
+    },
+    /// A value of the wrong type, outside its range, or in contradiction to another.
+    #[error("{field}: found {found}, must be {allowed}")]
+    Invalid {
+        /// Path of the field.
+        field: String,
+        /// What was found there.
+        found: String,
+        /// What may stand there; completes "must be …".
+        allowed: String,
+    },
+    /// A part of the schema that this release cannot solve.
+    #[error("{field}: not yet supported: {what}")]
+    Unsupported {
+        /// Path of the field.
+        field: String,
+        /// What is not supported, and what may stand there instead.
+        what: String,
+    },
+}
+
+impl ScenarioError {
+    /// An [`ScenarioError::Invalid`] of these parts.
+    pub(crate) fn invalid(
+        field: impl Into<String>,
+        found: impl Into<String>,
+        allowed: impl Into<String>,
+    ) -> Self {
+        Self::Invalid {
+            field: field.into(),
+            found: found.into(),
+            allowed: allowed.into(),
+        }
+    }
+
+    /// An [`ScenarioError::Unsupported`] of these parts.
+    pub(crate) fn unsupported(field: impl Into<String>, what: impl Into<String>) -> Self {
+        Self::Unsupported {
+            field: field.into(),
+            what: what.into(),
+        }
+    }
+
+    /// Path of the field at fault; `None` for a syntax error.
+    pub fn field(&self) -> Option<&str> {
+        match self {
+            Self::Syntax { .. } => None,
+            Self::UnknownField { field, .. }
+            | Self::UnknownChoice { field, .. }
+            | Self::Invalid { field, .. }
+            | Self::Unsupported { field, .. } => Some(field),
+        }
+    }
+
+    /// The same error at another path.
+    pub(crate) fn map_field(mut self, map: impl FnOnce(&str) -> String) -> Self {
+        match &mut self {
+            Self::Syntax { .. } => {}
+            Self::UnknownField { field, .. }
+            | Self::UnknownChoice { field, .. }
+            | Self::Invalid { field, .. }
+            | Self::Unsupported { field, .. } => *field = map(field),
+        }
+        self
+    }
+}
+
+fn hint(nearest: &Option<String>) -> String {
+    nearest
+        .as_ref()
+        .map_or_else(String::new, |word| format!("did you mean \"{word}\"? "))
+}
+
+fn question(nearest: &Option<String>) -> String {
+    nearest
+        .as_ref()
+        .map_or_else(String::new, |word| format!(" (did you mean \"{word}\"?)"))
+}

@@ -1,0 +1,559 @@
+//! The scenario schema: what is to be solved, as it stands in a TOML or JSON file.
+//!
+//! Any consistent set of units serves; SI is assumed in the words below. Angles are in radians.
+
+mod node;
+mod parse;
+#[cfg(test)]
+mod tests;
+mod untagged;
+mod validate;
+
+pub use crate::energy::EnergyModel;
+pub use parse::{LONGEST_JSON, LONGEST_TOML};
+
+use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Two places along the spine closer than this, relative to the length of the belt, are one place: sums of decimal
+/// lengths are not exact.
+pub const SAME_PLACE: f64 = 1e-9;
+
+/// A belt, its supports and loads, and how to solve for its shape.
+///
+/// Units: SI (m, N, rad, kg) or any consistent set.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Scenario {
+    /// Name for people, as in titles of figures.
+    #[serde(default)]
+    pub name: String,
+    /// Energy model of the bent belt.
+    #[serde(default)]
+    pub energy: EnergyModel,
+    /// The belt itself, in its flat, unloaded state.
+    pub belt: BeltSpec,
+    /// What holds the belt, in the order of `at`. Without any, the start is held in the natural pose.
+    #[serde(default)]
+    pub supports: Vec<SupportSpec>,
+    /// Pairs of spine points held at a fixed offset, Eq. (35).
+    #[serde(default)]
+    pub links: Vec<LinkSpec>,
+    /// Gravity and dead forces.
+    #[serde(default)]
+    pub loads: LoadsSpec,
+    /// How to solve.
+    #[serde(default)]
+    pub solver: SolverSpec,
+}
+
+/// The board that the belt is cut from: width, rigidity, and its segments along the spine.
+///
+/// Its rigidity comes from exactly one of `rigidity`, `material` and `layers`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BeltSpec {
+    /// Width V. Units: m.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub width: f64,
+    /// Flexural rigidity R_f of the whole width. Units: N·m².
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub rigidity: Option<f64>,
+    /// One homogeneous sheet, in place of `rigidity`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub material: Option<Material>,
+    /// A laminate, in place of `rigidity`: from bottom (−ξ) to top.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub layers: Option<Vec<Layer>>,
+    /// Poisson's ratio ν, used only where `natural_bend` is not 0; a material's own value wins.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = -1, "exclusiveMaximum" = 0.5))]
+    pub poisson: Option<f64>,
+    /// Bend ω_ζ of the unloaded belt; positive curls towards −ξ. Units: rad/m.
+    #[serde(default)]
+    pub natural_bend: f64,
+    /// Mass per length, lumped on the spine; a material or layers that give it win. Units: kg/m.
+    #[serde(default)]
+    #[schemars(extend("minimum" = 0))]
+    pub density: f64,
+    /// Whether the end joins the start.
+    #[serde(default)]
+    pub closed: bool,
+    /// Signed initial twist of a closed belt, in half turns.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub half_turns: Option<i32>,
+    /// What the belt consists of, in order along the spine.
+    #[schemars(length(min = 1))]
+    pub segments: Vec<SegmentSpec>,
+}
+
+/// A homogeneous, isotropic sheet.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Material {
+    /// Name of a known material, in place of `young`, `poisson` and `density`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub preset: Option<String>,
+    /// Young's modulus E. Units: Pa.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub young: Option<f64>,
+    /// Poisson's ratio ν.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = -1, "exclusiveMaximum" = 0.5))]
+    pub poisson: Option<f64>,
+    /// Thickness t. Units: m.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub thickness: f64,
+    /// Mass per volume. Units: kg/m³.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("minimum" = 0))]
+    pub density: Option<f64>,
+}
+
+/// One layer of a laminate.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Layer {
+    /// Name of a known material.
+    pub material: String,
+    /// Thickness. Units: m.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub thickness: f64,
+}
+
+/// A stretch of the belt, or a bend of the board between two.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "lowercase", deny_unknown_fields)]
+pub enum SegmentSpec {
+    /// A straight strip.
+    Straight {
+        /// Length along the spine. Units: m.
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        length: f64,
+        /// Bend ω_ζ of the unloaded segment, in place of the belt's. Units: rad/m.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        natural_bend: Option<f64>,
+        /// Flexural rigidity, in place of the belt's. Units: N·m².
+        #[serde(skip_serializing_if = "Option::is_none")]
+        rigidity: Option<Rigidity>,
+    },
+    /// A strip curved in its plane.
+    Arc {
+        /// Length along the spine. Units: m.
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        length: f64,
+        /// In-plane (geodesic) curvature; positive turns η towards ζ. Units: rad/m.
+        curvature: f64,
+        /// Bend ω_ζ of the unloaded segment, in place of the belt's. Units: rad/m.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        natural_bend: Option<f64>,
+        /// Flexural rigidity, in place of the belt's. Units: N·m².
+        #[serde(skip_serializing_if = "Option::is_none")]
+        rigidity: Option<Rigidity>,
+    },
+    /// A bend of the board at a point.
+    Corner {
+        /// Angle; positive turns η towards ζ. Units: rad.
+        angle: f64,
+    },
+    /// A stiffener.
+    Rigid {
+        /// Length along the spine. Units: m.
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        length: f64,
+    },
+}
+
+/// Flexural rigidity of a segment: one number, or a table along it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum Rigidity {
+    /// The same everywhere. Units: N·m².
+    Constant(f64),
+    /// Piecewise linear along the segment.
+    Table(RigidityTable),
+}
+
+/// Flexural rigidity, piecewise linear along a segment.
+///
+/// Shapes: `u` and `value` have one length, at least 2.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RigidityTable {
+    /// Arc lengths from the start of the segment, rising. Units: m.
+    #[schemars(length(min = 2))]
+    pub u: Vec<f64>,
+    /// Rigidity at each of them. Units: N·m².
+    #[schemars(length(min = 2))]
+    pub value: Vec<f64>,
+}
+
+/// A place along the spine.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Place {
+    /// The start of the belt, u = 0.
+    Start,
+    /// The end of the belt, u = U.
+    End,
+    /// An arc length from the start. Units: m.
+    ArcLength(f64),
+}
+
+/// One component of a support's position.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Component {
+    /// Held at this coordinate. Units: m.
+    Held(f64),
+    /// Free to move.
+    Free,
+}
+
+/// A body axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Axis {
+    /// The normal ξ.
+    Xi,
+    /// The tangent η.
+    Eta,
+    /// The width direction ζ.
+    Zeta,
+}
+
+/// What holds the belt at one point of its spine.
+///
+/// Its orientation is given by at most one of `rotation`, `euler` and `quaternion`; without any it is free.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SupportSpec {
+    /// Where along the spine.
+    pub at: Place,
+    /// Position of the spine point, world axes; leave out for a free position. Shapes: (3,). Units: m.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub position: Option<[Component; 3]>,
+    /// Frame as a rotation vector, `R = exp([rotation]×)`, world axes. Shapes: (3,). Units: rad.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rotation: Option<[f64; 3]>,
+    /// Frame as Eulerian angles [φ, θ, ψ], Eq. (1). Shapes: (3,). Units: rad.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub euler: Option<[f64; 3]>,
+    /// Frame as a unit quaternion [w, x, y, z]. Shapes: (4,).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub quaternion: Option<[f64; 4]>,
+    /// Body axis about which the held frame is free to turn.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hinge: Option<Axis>,
+    /// Whether the rib is square to the spine, β = 0. Default: at an end with both position and orientation.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub square_rib: Option<bool>,
+}
+
+/// Two spine points held at a fixed offset.
+///
+/// Source: Eq. (35).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LinkSpec {
+    /// The point that the offset is counted from.
+    pub from: Place,
+    /// The point at the offset.
+    pub to: Place,
+    /// x(to) − x(from), world axes. Shapes: (3,). Units: m.
+    pub offset: [f64; 3],
+}
+
+/// Loads that have a potential.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LoadsSpec {
+    /// Acceleration of gravity, world axes. Shapes: (3,). Units: m/s².
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gravity: Option<[f64; 3]>,
+    /// Dead forces at points.
+    #[serde(default)]
+    pub points: Vec<PointLoad>,
+}
+
+/// A dead force at one point of the spine, or off it at the end of a lever.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PointLoad {
+    /// Where along the spine.
+    pub at: Place,
+    /// Force, world axes. Shapes: (3,). Units: N.
+    pub force: [f64; 3],
+    /// From the spine point to where the force acts, body axes. Shapes: (3,). Units: m.
+    #[serde(default)]
+    pub lever: [f64; 3],
+}
+
+/// The method of solution.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Method {
+    /// Bend and rib slope as the only unknowns.
+    #[default]
+    Intrinsic,
+    /// The source's own: Ritz's method with Eulerian angles, Eq. (37)–(43).
+    Ritz,
+}
+
+/// How to solve.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct SolverSpec {
+    /// The method of solution.
+    pub method: Method,
+    /// Number of elements in all, shared out by length. Default: 8 U/V, at least 80.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 4, max = 100_000))]
+    pub elements: Option<usize>,
+    /// Max-norm of stationarity, constraints and complementarity, with lengths in U and energy in mean R_f/U.
+    #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
+    pub tolerance: f64,
+    /// Which of mirror twins to take: the one that bulges along this direction, world axes. Shapes: (3,).
+    pub bulge: [f64; 3],
+    /// Settings of the method `ritz`.
+    pub ritz: RitzSpec,
+}
+
+impl Default for SolverSpec {
+    fn default() -> Self {
+        Self {
+            method: Method::default(),
+            elements: None,
+            tolerance: 1e-8,
+            bulge: [1.0, 0.0, 0.0],
+            ritz: RitzSpec::default(),
+        }
+    }
+}
+
+/// Settings of the source's own method.
+///
+/// Source: Eq. (37)–(43).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RitzSpec {
+    /// Number of basis functions of each angle: 1, u, and pairs of a sine and a cosine, Eq. (41)–(43); even.
+    #[schemars(range(min = 6, max = 200), extend("multipleOf" = 2))]
+    pub basis: usize,
+    /// Number of points where Eq. (25) and (32) are collocated.
+    #[schemars(range(min = 2, max = 10_000))]
+    pub points: usize,
+    /// Penalty on the collocated constraints; the default is that at which the source's printed shapes come out.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub penalty: f64,
+    /// Number of updates of the multipliers; 0 keeps to the penalty alone.
+    #[schemars(range(max = 10_000))]
+    pub updates: usize,
+}
+
+impl Default for RitzSpec {
+    fn default() -> Self {
+        Self {
+            basis: 10,
+            points: 16,
+            penalty: 1e2,
+            updates: 1,
+        }
+    }
+}
+
+impl Scenario {
+    /// Number of elements: the solver's own, or 8 U/V and at least 80.
+    ///
+    /// Elements longer than V/4 give false energy levels; V/8 is safe.
+    pub fn elements(&self) -> usize {
+        self.solver
+            .elements
+            .unwrap_or_else(|| default_elements(self.belt.length(), self.belt.width))
+    }
+}
+
+/// 8 U/V rounded up, at least 80; saturates.
+fn default_elements(length: f64, width: f64) -> usize {
+    // A decimal U/V such as 0.3/0.1 comes out an ulp too large or too small; it shall not cost one more element.
+    let exact = 8.0 * length / width;
+    ((exact - 1e-9 * exact).ceil() as usize).max(80)
+}
+
+impl BeltSpec {
+    /// Length U of the spine. Units: m.
+    pub fn length(&self) -> f64 {
+        self.segments.iter().map(SegmentSpec::length).sum()
+    }
+
+    /// Flexural rigidity R_f of a belt that has one rigidity throughout; `None` of any other. Units: N·m².
+    pub fn rigidity_value(&self) -> Option<f64> {
+        let mut flexible = self.segments.iter().filter(|s| s.is_flexible());
+        let first = self.segment_rigidity(flexible.next()?)?;
+        flexible
+            .all(|segment| self.segment_rigidity(segment) == Some(first))
+            .then_some(first)
+    }
+
+    /// Rigidity that stands for the whole belt, from `rigidity` or the material. Units: N·m².
+    fn own_rigidity(&self) -> Option<f64> {
+        self.rigidity
+            .or_else(|| self.material.as_ref()?.rigidity(self.width))
+    }
+
+    fn segment_rigidity(&self, segment: &SegmentSpec) -> Option<f64> {
+        match segment.rigidity() {
+            Some(Rigidity::Constant(value)) => Some(*value),
+            Some(Rigidity::Table(_)) => None,
+            None => self.own_rigidity(),
+        }
+    }
+
+    /// Mass per length of the spine: the material's where it gives one, else `density`. Units: kg/m.
+    pub fn density_value(&self) -> f64 {
+        self.material
+            .as_ref()
+            .and_then(|material| material.mass_per_length(self.width))
+            .unwrap_or(self.density)
+    }
+}
+
+impl Material {
+    /// Rigidity of a strip of this sheet: E t³ V / (12 (1 − ν²)). Units: N·m².
+    pub fn rigidity(&self, width: f64) -> Option<f64> {
+        let (young, poisson) = (self.young?, self.poisson?);
+        Some(young * self.thickness.powi(3) * width / (12.0 * (1.0 - poisson * poisson)))
+    }
+
+    /// Mass per length of a strip of this sheet: ρ V t. Units: kg/m.
+    pub fn mass_per_length(&self, width: f64) -> Option<f64> {
+        Some(self.density? * width * self.thickness)
+    }
+}
+
+impl SegmentSpec {
+    /// A straight segment with the belt's own rigidity.
+    pub fn straight(length: f64) -> Self {
+        Self::Straight {
+            length,
+            natural_bend: None,
+            rigidity: None,
+        }
+    }
+
+    /// Length along the spine; 0 of a corner. Units: m.
+    pub fn length(&self) -> f64 {
+        match self {
+            Self::Straight { length, .. } | Self::Arc { length, .. } | Self::Rigid { length } => {
+                *length
+            }
+            Self::Corner { .. } => 0.0,
+        }
+    }
+
+    /// The segment's own rigidity, where it has one.
+    pub fn rigidity(&self) -> Option<&Rigidity> {
+        match self {
+            Self::Straight { rigidity, .. } | Self::Arc { rigidity, .. } => rigidity.as_ref(),
+            Self::Corner { .. } | Self::Rigid { .. } => None,
+        }
+    }
+
+    fn natural_bend(&self) -> Option<f64> {
+        match self {
+            Self::Straight { natural_bend, .. } | Self::Arc { natural_bend, .. } => *natural_bend,
+            Self::Corner { .. } | Self::Rigid { .. } => None,
+        }
+    }
+
+    /// Whether the segment bends at all.
+    pub fn is_flexible(&self) -> bool {
+        matches!(self, Self::Straight { .. } | Self::Arc { .. })
+    }
+}
+
+impl Place {
+    /// Arc length from the start of a belt of this length; a number within [`SAME_PLACE`] of an end is that end.
+    pub fn arc_length(&self, length: f64) -> f64 {
+        match *self {
+            Self::Start => 0.0,
+            Self::End => length,
+            Self::ArcLength(u) if u.abs() <= SAME_PLACE * length => 0.0,
+            Self::ArcLength(u) if (u - length).abs() <= SAME_PLACE * length => length,
+            Self::ArcLength(u) => u,
+        }
+    }
+
+    /// Whether this is the start or the end of a belt of this length.
+    pub fn is_end(&self, length: f64) -> bool {
+        let u = self.arc_length(length);
+        u == 0.0 || u == length
+    }
+}
+
+impl SupportSpec {
+    /// Frame R = [ξ η ζ] that the support holds; `None` where the orientation is free.
+    ///
+    /// Shapes: (3, 3), columns ξ, η, ζ.
+    /// Source: Eq. (1) for `euler`, written as Rz(φ) Ry(θ) Rz(ψ).
+    pub fn frame(&self) -> Option<Matrix3<f64>> {
+        let rotation = if let Some(vector) = self.rotation {
+            Rotation3::from_scaled_axis(Vector3::from(vector))
+        } else if let Some([phi, theta, psi]) = self.euler {
+            about_z(phi) * Rotation3::from_axis_angle(&Vector3::y_axis(), theta) * about_z(psi)
+        } else {
+            let [w, x, y, z] = self.quaternion?;
+            UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)).to_rotation_matrix()
+        };
+        Some(rotation.into_inner())
+    }
+
+    /// Components of the position that the support holds. Units: m.
+    pub fn components(&self) -> [Option<f64>; 3] {
+        self.position.map_or([None; 3], |position| {
+            position.map(|component| component.value())
+        })
+    }
+
+    /// Position that the support holds; `None` where it, or a component of it, is free. Units: m.
+    pub fn point(&self) -> Option<Vector3<f64>> {
+        let [x, y, z] = self.components();
+        Some(Vector3::new(x?, y?, z?))
+    }
+
+    /// Whether the rib is square to the spine, β = 0, on a belt of this length.
+    ///
+    /// Source: Eq. (45)–(50) for connectors.
+    pub fn is_square_rib(&self, length: f64) -> bool {
+        self.square_rib.unwrap_or_else(|| {
+            self.at.is_end(length) && self.position.is_some() && self.has_orientation()
+        })
+    }
+
+    fn has_orientation(&self) -> bool {
+        self.rotation.is_some() || self.euler.is_some() || self.quaternion.is_some()
+    }
+}
+
+fn about_z(angle: f64) -> Rotation3<f64> {
+    Rotation3::from_axis_angle(&Vector3::z_axis(), angle)
+}
+
+impl Component {
+    /// The coordinate held; `None` where it is free. Units: m.
+    pub fn value(&self) -> Option<f64> {
+        match *self {
+            Self::Held(value) => Some(value),
+            Self::Free => None,
+        }
+    }
+}
+
+/// The JSON Schema of [`Scenario`], as committed in `scenarios/scenario.schema.json`.
+pub fn json_schema() -> String {
+    let schema = schemars::schema_for!(Scenario);
+    let mut text = serde_json::to_string_pretty(&schema).expect("a schema is plain JSON");
+    text.push('\n');
+    text
+}
