@@ -7,7 +7,10 @@
 //! Equation numbers, as in `Eq. (34)`, are those of Wakamatsu, Arai and Hirai, "Fishbone Model for Belt Object
 //! Deformation".
 
+pub mod element;
 pub mod energy;
 pub mod error;
 pub mod lie;
 pub mod scenario;
+pub mod spine;
+pub mod surface;

@@ -1,0 +1,295 @@
+//! The solved centre line with its ribs: what the surface and every report are drawn from.
+
+use crate::element::increment;
+use crate::lie::Pose;
+use crate::surface::{curvature, rib_angle, torsion};
+use nalgebra::Vector4;
+
+/// The spine at its nodes, in the units of the scenario.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Spine {
+    /// Width V of the belt.
+    pub width: f64,
+    /// Arc length u of every node, rising from 0 to U.
+    pub u: Vec<f64>,
+    /// Pose of every node.
+    pub pose: Vec<Pose>,
+    /// Bend ω_ζ at every node; linear in between.
+    pub bend: Vec<f64>,
+    /// Rib slope β = tan α at every node, Eq. (31); linear in between.
+    pub rib_slope: Vec<f64>,
+}
+
+/// The spine at one arc length.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SpinePoint {
+    /// Arc length.
+    pub u: f64,
+    /// Pose: frame and position.
+    pub pose: Pose,
+    /// Bend ω_ζ.
+    pub bend: f64,
+    /// Rib slope β.
+    pub rib_slope: f64,
+}
+
+/// The geodesic curvature κ_g of the spine of a rectangular belt.
+///
+/// Source: Eq. (25)
+const STRAIGHT: f64 = 0.0;
+
+impl Spine {
+    /// The spine of given fields at the nodes, integrated from the pose at the first one.
+    ///
+    /// Shapes: `u`, `bend` and `rib_slope` of one length, `u` not falling.
+    ///
+    /// # Panics
+    ///
+    /// If the lengths differ.
+    pub fn from_fields(
+        width: f64,
+        start: Pose,
+        u: Vec<f64>,
+        bend: Vec<f64>,
+        rib_slope: Vec<f64>,
+    ) -> Self {
+        assert!(u.len() == bend.len() && u.len() == rib_slope.len());
+        let mut spine = Self {
+            width,
+            pose: vec![start; u.len()],
+            u,
+            bend,
+            rib_slope,
+        };
+        for element in 0..spine.elements() {
+            spine.pose[element + 1] = spine.pose_within(element, spine.element_length(element));
+        }
+        spine
+    }
+
+    /// Length U.
+    pub fn length(&self) -> f64 {
+        self.u.last().copied().unwrap_or(0.0) - self.u.first().copied().unwrap_or(0.0)
+    }
+
+    /// Torsion ω_η = −β ω_ζ at every node.
+    ///
+    /// Source: Eq. (32)
+    pub fn torsion(&self) -> Vec<f64> {
+        self.map_fields(torsion)
+    }
+
+    /// Rib angle α = atan β at every node.
+    ///
+    /// Source: Eq. (31)
+    pub fn rib_angle(&self) -> Vec<f64> {
+        self.rib_slope.iter().copied().map(rib_angle).collect()
+    }
+
+    /// The non-zero principal curvature κ₁ = −ω_ζ (1 + β²) at every node.
+    ///
+    /// Source: Eq. (29)
+    pub fn curvature(&self) -> Vec<f64> {
+        self.map_fields(curvature)
+    }
+
+    /// Total torsion ∫ ω_η du.
+    ///
+    /// Simpson's rule, exact for the product of two linear fields.
+    ///
+    /// Units: rad
+    pub fn twist(&self) -> f64 {
+        (0..self.elements())
+            .map(|element| self.element_twist(element))
+            .sum()
+    }
+
+    /// The spine at arc length u, held to [0, U]; before the jump where a node is repeated.
+    ///
+    /// # Panics
+    ///
+    /// If the spine has no nodes.
+    pub fn at(&self, u: f64) -> SpinePoint {
+        let next = self.u.partition_point(|&node| node < u);
+        if next == self.u.len() {
+            return self.node(next - 1);
+        }
+        if next == 0 || self.u[next] == u {
+            return self.node(next);
+        }
+        self.within(next - 1, u - self.u[next - 1])
+    }
+
+    /// The spine at a node.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such node.
+    pub fn node(&self, index: usize) -> SpinePoint {
+        SpinePoint {
+            u: self.u[index],
+            pose: self.pose[index],
+            bend: self.bend[index],
+            rib_slope: self.rib_slope[index],
+        }
+    }
+
+    /// Number of elements.
+    pub(crate) fn elements(&self) -> usize {
+        self.u.len().saturating_sub(1)
+    }
+
+    /// Length of an element; 0 where a node is repeated.
+    pub(crate) fn element_length(&self, element: usize) -> f64 {
+        self.u[element + 1] - self.u[element]
+    }
+
+    /// The spine inside an element, a distance after its first node.
+    ///
+    /// The fields are taken at the two Gauss points of the part before, so that a full element repeats the
+    /// solver's own step.
+    pub(crate) fn within(&self, element: usize, distance: f64) -> SpinePoint {
+        let (bend, rib_slope) = self.fields(element, distance);
+        SpinePoint {
+            u: self.u[element] + distance,
+            pose: self.pose_within(element, distance),
+            bend,
+            rib_slope,
+        }
+    }
+
+    /// Bend and rib slope inside an element.
+    pub(crate) fn fields(&self, element: usize, distance: f64) -> (f64, f64) {
+        let fraction = distance / self.element_length(element);
+        let between = |field: &[f64]| match fraction.is_finite() {
+            true => field[element] + fraction * (field[element + 1] - field[element]),
+            false => field[element],
+        };
+        (between(&self.bend), between(&self.rib_slope))
+    }
+
+    fn pose_within(&self, element: usize, distance: f64) -> Pose {
+        let (bend, slope) = (self.bend[element], self.rib_slope[element]);
+        let (bend_there, slope_there) = self.fields(element, distance);
+        let fields = Vector4::new(bend, slope, bend_there, slope_there);
+        self.pose[element] * increment(distance, STRAIGHT, &fields)
+    }
+
+    fn element_twist(&self, element: usize) -> f64 {
+        let length = self.element_length(element);
+        let at = |distance: f64| {
+            let (bend, rib_slope) = self.fields(element, distance);
+            torsion(bend, rib_slope)
+        };
+        length / 6.0 * (at(0.0) + 4.0 * at(0.5 * length) + at(length))
+    }
+
+    fn map_fields(&self, f: impl Fn(f64, f64) -> f64) -> Vec<f64> {
+        let fields = self.bend.iter().zip(&self.rib_slope);
+        fields.map(|(&bend, &slope)| f(bend, slope)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::element::strain;
+    use crate::lie::hat;
+    use approx::assert_relative_eq;
+    use nalgebra::Vector3;
+
+    fn uniform(n: usize, bend: impl Fn(f64) -> f64, slope: impl Fn(f64) -> f64) -> Spine {
+        let u: Vec<f64> = (0..=n).map(|i| i as f64 / n as f64).collect();
+        let bend = u.iter().copied().map(bend).collect();
+        let slope = u.iter().copied().map(slope).collect();
+        Spine::from_fields(0.1, Pose::identity(), u, bend, slope)
+    }
+
+    #[test]
+    fn test_constant_bend_makes_a_circle() {
+        let spine = uniform(7, |_| 2.0, |_| 0.0);
+        for u in [0.0f64, 0.1, 0.5, 0.93, 1.0] {
+            let expected = Vector3::new((2.0 * u).cos() - 1.0, (2.0 * u).sin(), 0.0) / 2.0;
+            assert_relative_eq!(spine.at(u).pose.position, expected, epsilon = 1e-14);
+        }
+    }
+
+    #[test]
+    fn test_constant_fields_make_a_helix_on_a_cylinder() {
+        let (a, radius) = (0.4f64, 0.3);
+        let spine = uniform(5, |_| a.cos().powi(2) / radius, |_| a.tan());
+        let axis = Vector3::new(0.0, -a.sin(), a.cos());
+        for i in 0..50 {
+            let from_axis = spine.at(f64::from(i) / 49.0).pose.position + Vector3::x() * radius;
+            assert_relative_eq!(from_axis.cross(&axis).norm(), radius, epsilon = 1e-13);
+        }
+    }
+
+    #[test]
+    fn test_points_between_nodes_converge_with_order_four() {
+        let make = |n| uniform(n, |u| 3.0 - 5.0 * u, |u| 2.0 * u - 0.5);
+        let fine = make(512).at(0.77).pose;
+        let error = |n| (make(n).at(0.77).pose.position - fine.position).norm();
+        assert!(error(16) < 1e-5);
+        assert!((error(8) / error(32)).log2() > 7.0);
+    }
+
+    #[test]
+    fn test_frame_turns_by_the_rates_between_nodes() {
+        let spine = uniform(40, |u| 3.0 - 5.0 * u, |u| 2.0 * u - 0.5);
+        let (u, h) = (0.4321, 1e-5);
+        let (before, here, after) = (spine.at(u - h), spine.at(u), spine.at(u + h));
+        let rates = strain(0.0, here.bend, here.rib_slope).rotation;
+        let frame_rate = (after.pose.frame - before.pose.frame) / (2.0 * h);
+        assert!((frame_rate - here.pose.frame * hat(&rates)).norm() < 1e-4);
+        let tangent = (after.pose.position - before.pose.position) / (2.0 * h);
+        assert!((tangent - here.pose.frame.column(1)).norm() < 1e-4);
+    }
+
+    #[test]
+    fn test_end_of_an_element_is_its_second_node() {
+        let spine = uniform(9, |u| 3.0 - 5.0 * u, |u| 2.0 * u);
+        for element in 0..9 {
+            let end = spine.within(element, spine.element_length(element));
+            assert_relative_eq!(
+                end.pose.position,
+                spine.pose[element + 1].position,
+                epsilon = 1e-14
+            );
+        }
+    }
+
+    #[test]
+    fn test_arc_length_beyond_the_ends_is_held() {
+        let spine = uniform(3, |_| 1.0, |u| u);
+        assert_eq!(spine.at(-1.0), spine.node(0));
+        assert_eq!(spine.at(2.0), spine.node(3));
+    }
+
+    #[test]
+    fn test_at_a_repeated_node_the_one_before_counts() {
+        let u = vec![0.0, 0.5, 0.5, 1.0];
+        let spine = Spine::from_fields(
+            0.1,
+            Pose::identity(),
+            u,
+            vec![1.0, 1.0, 3.0, 3.0],
+            vec![0.0; 4],
+        );
+        assert_eq!(spine.at(0.5).bend, 1.0);
+        assert_eq!(spine.at(0.5 + 1e-9).bend, 3.0);
+        assert_eq!(spine.pose[1], spine.pose[2]);
+    }
+
+    #[test]
+    fn test_twist_is_exact_for_linear_fields() {
+        // −∫ (3 − 5u)(2u − 0.5) du over [0, 1]
+        let spine = uniform(3, |u| 3.0 - 5.0 * u, |u| 2.0 * u - 0.5);
+        assert_relative_eq!(
+            spine.twist(),
+            -(-1.5 + 8.5 / 2.0 - 10.0 / 3.0),
+            epsilon = 1e-14
+        );
+        assert_relative_eq!(spine.length(), 1.0);
+    }
+}

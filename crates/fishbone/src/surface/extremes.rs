@@ -1,0 +1,327 @@
+//! Highest point, tightest bend, narrowest margin.
+
+use super::curvature::{bend_radius, curvature};
+use super::rib::{Board, rib_convergence, rib_convergence_bound, rib_foot};
+use crate::spine::{Spine, SpinePoint};
+use nalgebra::Vector3;
+
+/// The farthest point of the spine along a direction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HighestPoint {
+    /// Its arc length.
+    pub u: f64,
+    /// Its position.
+    pub position: Vector3<f64>,
+}
+
+/// The farthest point of the spine along a direction (of any length), between nodes too; the first of equals.
+///
+/// # Panics
+///
+/// If the spine has no nodes.
+pub fn highest_point(spine: &Spine, direction: &Vector3<f64>) -> HighestPoint {
+    let nodes = (0..spine.u.len()).map(|node| spine.node(node));
+    let peaks = (0..spine.elements()).flat_map(|element| peaks(spine, element, direction));
+    let height = |point: &SpinePoint| point.pose.position.dot(direction);
+    let higher = |best: SpinePoint, point| {
+        if height(&point) > height(&best) {
+            point
+        } else {
+            best
+        }
+    };
+    let best = nodes.chain(peaks).fold(spine.node(0), higher);
+    HighestPoint {
+        u: best.u,
+        position: best.pose.position,
+    }
+}
+
+/// Pieces of an element that turn by half a radian at most, so that none hides a peak and a valley.
+fn pieces(spine: &Spine, element: usize) -> usize {
+    let rate = |node: usize| spine.bend[node].abs() * 1f64.hypot(spine.rib_slope[node]);
+    let turn = spine.element_length(element) * rate(element).max(rate(element + 1));
+    (2.0 * turn).ceil().clamp(1.0, 1000.0) as usize
+}
+
+/// The points inside an element where the spine turns from rising to falling along a direction.
+fn peaks(spine: &Spine, element: usize, direction: &Vector3<f64>) -> Vec<SpinePoint> {
+    let rise = |distance: f64| {
+        let tangent = spine
+            .within(element, distance)
+            .pose
+            .frame
+            .column(1)
+            .into_owned();
+        tangent.dot(direction)
+    };
+    let piece = spine.element_length(element) / pieces(spine, element) as f64;
+    let bounds = (0..pieces(spine, element)).map(|i| (i as f64 * piece, (i + 1) as f64 * piece));
+    let with_peak = bounds.filter(|&(a, b)| rise(a) > 0.0 && rise(b) < 0.0);
+    with_peak
+        .map(|(a, b)| spine.within(element, bisect(rise, a, b)))
+        .collect()
+}
+
+/// The root of a falling function between a and b.
+fn bisect(f: impl Fn(f64) -> f64, mut a: f64, mut b: f64) -> f64 {
+    for _ in 0..60 {
+        let middle = 0.5 * (a + b);
+        if f(middle) > 0.0 {
+            a = middle;
+        } else {
+            b = middle;
+        }
+    }
+    0.5 * (a + b)
+}
+
+/// The tightest bend of the surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BendRadius {
+    /// Its radius; 0 where ribs meet on an edge.
+    pub value: f64,
+    /// Arc length of the foot of its rib.
+    pub u: f64,
+    /// Where on the rib, v in [−V/2, V/2].
+    pub v: f64,
+}
+
+/// Samples in each smooth piece from which the tightest bend is refined.
+const SAMPLES: usize = 8;
+
+/// The least radius of bend over the whole width, (1 − v s)/|κ₁|; `None` where the belt is flat all over.
+///
+/// In each element s is constant and the tightest point of a rib is the end towards which the ribs converge.
+pub fn least_bend_radius(spine: &Spine) -> Option<BendRadius> {
+    let board = Board::of(spine);
+    let pieces = bent_elements(spine).flat_map(|element| smooth_pieces(spine, &board, element));
+    let bends = pieces.map(|piece| tightest_in(spine, &board, piece));
+    let least = bends.min_by(|a, b| a.value.total_cmp(&b.value));
+    least.filter(|bend| bend.value.is_finite())
+}
+
+/// A part of an element, by distances from its first node.
+#[derive(Clone, Copy)]
+struct Piece {
+    element: usize,
+    from: f64,
+    to: f64,
+}
+
+/// The parts of an element between the ribs through the board's corners, where the ribs' ends change lines.
+fn smooth_pieces(spine: &Spine, board: &Board, element: usize) -> Vec<Piece> {
+    let length = spine.element_length(element);
+    let feet = board
+        .corners()
+        .map(|corner| rib_foot(spine, corner.x, corner.y));
+    let inside = |distance: &f64| 0.0 < *distance && *distance < length;
+    let mut cuts: Vec<f64> = feet
+        .iter()
+        .map(|foot| foot - spine.u[element])
+        .filter(inside)
+        .collect();
+    cuts.extend([0.0, length]);
+    cuts.sort_by(f64::total_cmp);
+    cuts.windows(2)
+        .map(|cut| Piece {
+            element,
+            from: cut[0],
+            to: cut[1],
+        })
+        .collect()
+}
+
+fn bent_elements(spine: &Spine) -> impl Iterator<Item = usize> {
+    (0..spine.elements()).filter(|&element| spine.element_length(element) > 0.0)
+}
+
+fn convergence(spine: &Spine, element: usize) -> f64 {
+    let rise = spine.rib_slope[element + 1] - spine.rib_slope[element];
+    rib_convergence(
+        rise / spine.element_length(element),
+        0.0,
+        spine.rib_slope[element],
+    )
+}
+
+fn tightest_in(spine: &Spine, board: &Board, piece: Piece) -> BendRadius {
+    let radius = |distance: f64| tightest_on_rib(spine, board, piece.element, distance);
+    let step = (piece.to - piece.from) / SAMPLES as f64;
+    let samples = (0..=SAMPLES).map(|i| radius(piece.from + i as f64 * step));
+    let sharper = |a: BendRadius, b: BendRadius| if b.value < a.value { b } else { a };
+    let best = samples.fold(radius(piece.from), sharper);
+    let centre = best.u - spine.u[piece.element];
+    let (low, high) = (
+        (centre - step).max(piece.from),
+        (centre + step).min(piece.to),
+    );
+    sharper(best, radius(golden_section(|x| radius(x).value, low, high)))
+}
+
+fn tightest_on_rib(spine: &Spine, board: &Board, element: usize, distance: f64) -> BendRadius {
+    let (bend, slope) = spine.fields(element, distance);
+    let (u, s) = (spine.u[element] + distance, convergence(spine, element));
+    let [minus, plus] = board.rib_ends(u, slope).map(|end| end.y);
+    let v = if s > 0.0 {
+        plus
+    } else if s < 0.0 {
+        minus
+    } else {
+        0.0
+    };
+    BendRadius {
+        value: bend_radius(curvature(bend, slope), s, v),
+        u,
+        v,
+    }
+}
+
+/// The least value's place of a function with one valley between a and b.
+fn golden_section(f: impl Fn(f64) -> f64, mut a: f64, mut b: f64) -> f64 {
+    let ratio = 0.5 * (5f64.sqrt() - 1.0);
+    for _ in 0..50 {
+        let (left, right) = (b - ratio * (b - a), a + ratio * (b - a));
+        if f(left) < f(right) {
+            b = right;
+        } else {
+            a = left;
+        }
+    }
+    0.5 * (a + b)
+}
+
+/// How far the ribs are from crossing on an edge.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RibMargin {
+    /// Least of 2/V − |s|; negative where ribs cross inside the width.
+    pub value: f64,
+    /// Middle of the element where it is least.
+    pub u: f64,
+}
+
+/// The least of 2/V − |s| over the belt, s being constant in each element.
+///
+/// Source: Eq. (33)
+pub fn rib_margin(spine: &Spine) -> RibMargin {
+    let bound = rib_convergence_bound(spine.width);
+    let margin = |element: usize| RibMargin {
+        value: bound - convergence(spine, element).abs(),
+        u: 0.5 * (spine.u[element] + spine.u[element + 1]),
+    };
+    let start = RibMargin {
+        value: bound,
+        u: spine.u.first().copied().unwrap_or(0.0),
+    };
+    let narrower = |a: RibMargin, b: RibMargin| if b.value < a.value { b } else { a };
+    bent_elements(spine).map(margin).fold(start, narrower)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lie::Pose;
+    use crate::surface::samples::{spine, waves};
+    use approx::assert_relative_eq;
+    use proptest::prelude::*;
+
+    #[test]
+    fn test_highest_point_of_a_circle_is_found_between_nodes() {
+        // Half a turn of a circle of radius 1/3 in three elements.
+        let length = 3.0 * std::f64::consts::PI / 3.0;
+        let u = (0..4).map(|i| length * f64::from(i) / 3.0).collect();
+        let spine = Spine::from_fields(0.1, Pose::identity(), u, vec![3.0; 4], vec![0.0; 4]);
+        let direction = Vector3::new(-0.6, 0.8, 0.0) * 5.0;
+        let top = highest_point(&spine, &direction);
+        let expected = Vector3::new(-1.0 / 3.0, 0.0, 0.0) + direction / 15.0;
+        assert_relative_eq!(top.position, expected, epsilon = 1e-14);
+        assert_relative_eq!(spine.at(top.u).pose.position, expected, epsilon = 1e-14);
+    }
+
+    #[test]
+    fn test_highest_point_may_be_an_end() {
+        let spine = Spine::from_fields(
+            0.1,
+            Pose::identity(),
+            vec![0.0, 1.0],
+            vec![0.0; 2],
+            vec![0.0; 2],
+        );
+        assert_eq!(highest_point(&spine, &Vector3::y()).u, 1.0);
+        assert_eq!(highest_point(&spine, &-Vector3::y()).u, 0.0);
+    }
+
+    #[test]
+    fn test_least_bend_radius_of_a_wrap_is_that_of_its_cylinder() {
+        let (a, radius) = (0.6f64, 0.25);
+        let spine = spine(1.0, 0.1, 20, |_| a.cos().powi(2) / radius, |_| a.tan());
+        let least = least_bend_radius(&spine).map(|bend| bend.value);
+        assert_relative_eq!(least.unwrap_or(f64::NAN), radius, epsilon = 1e-14);
+    }
+
+    #[test]
+    fn test_least_bend_radius_of_a_cone_is_on_its_near_edge() {
+        // Ribs through the apex (y, z) = (0.5, 0.2): β = (u − 0.5)/0.2, s = 5, away from the ends.
+        let cone = |u: f64| 2.0 / (1.0 + ((u - 0.5) / 0.2).powi(2)).powf(1.5);
+        let spine = spine(1.0, 0.1, 2000, cone, |u| (u - 0.5) / 0.2);
+        let least = least_bend_radius(&spine).unwrap_or(BendRadius {
+            value: 0.0,
+            u: 0.0,
+            v: 0.0,
+        });
+        assert_relative_eq!(least.value, 0.75 / 2.0, epsilon = 1e-6);
+        assert_relative_eq!(least.u, 0.5, epsilon = 1e-3);
+        assert_relative_eq!(least.v, 0.05);
+    }
+
+    #[test]
+    fn test_flat_belt_has_no_bend_radius() {
+        assert_eq!(least_bend_radius(&spine(1.0, 0.1, 9, |_| 0.0, |u| u)), None);
+    }
+
+    #[test]
+    fn test_rib_margin_is_least_where_ribs_turn_fastest() {
+        let spine = spine(1.0, 0.1, 10, |_| 1.0, |u| -15.0 * (u - 0.7).clamp(0.0, 0.1));
+        let margin = rib_margin(&spine);
+        assert_relative_eq!(margin.value, 5.0, epsilon = 1e-12);
+        assert_relative_eq!(margin.u, 0.75, epsilon = 1e-12);
+        assert_eq!(rib_margin(&straight()).value, 20.0);
+    }
+
+    fn straight() -> Spine {
+        spine(1.0, 0.1, 4, |_| 1.0, |_| 0.3)
+    }
+
+    proptest! {
+        #[test]
+        fn test_no_sampled_point_is_higher((bend, slope) in waves(15.0)) {
+            let spine = spine(1.0, 0.1, 80, |u| bend.at(u), |u| slope.at(u));
+            let direction = Vector3::new(0.3, -0.5, 0.7);
+            let top = highest_point(&spine, &direction).position.dot(&direction);
+            for i in 0..=1000 {
+                prop_assert!(spine.at(f64::from(i) / 1000.0).pose.position.dot(&direction) <= top + 1e-9);
+            }
+        }
+
+        #[test]
+        fn test_no_sampled_bend_is_tighter((bend, slope) in waves(15.0)) {
+            let spine = spine(1.0, 0.1, 12, |u| bend.at(u), |u| slope.at(u));
+            let least = least_bend_radius(&spine).map_or(0.0, |bend| bend.value);
+            let board = Board::of(&spine);
+            for element in 0..12 {
+                let h = spine.element_length(element);
+                for i in 0..=100 {
+                    let (bend, slope) = spine.fields(element, h * f64::from(i) / 100.0);
+                    let u = spine.u[element] + h * f64::from(i) / 100.0;
+                    let [a, b] = board.rib_ends(u, slope).map(|end| end.y);
+                    for j in 0..=4 {
+                        let v = a + (b - a) * f64::from(j) / 4.0;
+                        let s = convergence(&spine, element);
+                        let radius = bend_radius(curvature(bend, slope), s, v);
+                        prop_assert!(radius >= least * (1.0 - 1e-9));
+                    }
+                }
+            }
+        }
+    }
+}

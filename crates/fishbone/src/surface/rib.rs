@@ -1,0 +1,412 @@
+//! Ribs: the straight lines of the surface, Eq. (20)–(22) and (26)–(33).
+
+use crate::lie::Pose;
+use crate::spine::{Spine, SpinePoint};
+use nalgebra::{Vector2, Vector3};
+
+/// Rib angle α = atan β.
+///
+/// Source: Eq. (31)
+///
+/// Units: rad, in (−π/2, π/2)
+pub fn rib_angle(rib_slope: f64) -> f64 {
+    rib_slope.atan()
+}
+
+/// Rib angle α = −atan(ω_η/ω_ζ) from the rates; `None` where both vanish and any line is a rib.
+///
+/// Source: Eq. (30)
+///
+/// Units: rad, in [−π/2, π/2]
+pub fn rib_angle_from_rates(bend: f64, torsion: f64) -> Option<f64> {
+    if bend == 0.0 && torsion == 0.0 {
+        return None;
+    }
+    Some(-(torsion / bend).atan())
+}
+
+/// Unit vector along a rib, r = −η sin α + ζ cos α.
+///
+/// Source: Eq. (20)
+pub fn rib_vector(pose: &Pose, rib_slope: f64) -> Vector3<f64> {
+    pose.frame * Vector3::new(0.0, -rib_slope, 1.0) / 1f64.hypot(rib_slope)
+}
+
+/// Unit vector across a rib in the tangent plane, d₁ = η cos α + ζ sin α: where κ₁ bends.
+///
+/// The source prints ξ cos α + η sin α before Eq. (29), which does not lie in the surface.
+pub fn bend_vector(pose: &Pose, rib_slope: f64) -> Vector3<f64> {
+    pose.frame * Vector3::new(0.0, 1.0, rib_slope) / 1f64.hypot(rib_slope)
+}
+
+/// Where the rib through P(u) meets the line v, as arc length along that line: u' = u − v β.
+///
+/// For v = +V/2 the source prints u + (V/2) tan α, which contradicts its Eq. (20).
+///
+/// Source: Eq. (22), sign corrected
+pub fn edge_foot(u: f64, rib_slope: f64, v: f64) -> f64 {
+    u - v * rib_slope
+}
+
+/// How fast neighbouring ribs converge towards +v: s = β' + κ_g (1 + β²).
+///
+/// The strip between two ribs is (1 − v s) du wide at v, so ribs meet at v = 1/s. For κ_g = 0 it is the β' of the source.
+///
+/// Source: Eq. (33), extended to curved belts
+pub fn rib_convergence(slope_rate: f64, geodesic: f64, rib_slope: f64) -> f64 {
+    slope_rate + geodesic * (1.0 + rib_slope * rib_slope)
+}
+
+/// The greatest |s| for which ribs do not cross inside the width, 2/V.
+///
+/// Source: Eq. (33)
+pub fn rib_convergence_bound(width: f64) -> f64 {
+    2.0 / width
+}
+
+/// The greatest |dα/du| for which the ribs of a straight belt do not cross inside the width.
+///
+/// Source: Eq. (28)
+pub fn rib_angle_rate_bound(rib_angle: f64, width: f64) -> f64 {
+    2.0 * rib_angle.cos().powi(2) / width
+}
+
+/// A rib within the board: everything the surface needs to know of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rib {
+    /// Arc length of its foot on the spine.
+    pub u: f64,
+    /// Pose of the foot.
+    pub pose: Pose,
+    /// Rib slope β.
+    pub slope: f64,
+    /// Where it leaves the board on the −ζ side, v ≤ 0.
+    pub v_minus: f64,
+    /// Where it leaves the board on the +ζ side, v ≥ 0.
+    pub v_plus: f64,
+}
+
+impl Rib {
+    /// The rib through P(u) of a rectangular belt, ending where it leaves the board.
+    ///
+    /// # Panics
+    ///
+    /// If the spine has no nodes.
+    pub fn at(spine: &Spine, u: f64) -> Self {
+        Self::on(&Board::of(spine), &spine.at(u))
+    }
+
+    pub(super) fn on(board: &Board, foot: &SpinePoint) -> Self {
+        let [minus, plus] = board.rib_ends(foot.u, foot.rib_slope);
+        Self {
+            u: foot.u,
+            pose: foot.pose,
+            slope: foot.rib_slope,
+            v_minus: minus.y,
+            v_plus: plus.y,
+        }
+    }
+
+    /// The point v of the rib, x(u) + v (ζ − β η).
+    ///
+    /// Source: Eq. (20), (21)
+    pub fn point(&self, v: f64) -> Vector3<f64> {
+        self.pose.transform(&Vector3::new(0.0, -v * self.slope, v))
+    }
+
+    /// The same point of the flat board: (y, z) along and across the spine.
+    pub fn flat_point(&self, v: f64) -> Vector2<f64> {
+        Vector2::new(edge_foot(self.u, self.slope, v), v)
+    }
+
+    /// `n` values of v, evenly from the −ζ end to the +ζ end.
+    pub fn stations(&self, n: usize) -> impl Iterator<Item = f64> + use<> {
+        let (minus, plus) = (self.v_minus, self.v_plus);
+        (0..n).map(move |i| {
+            let fraction = i as f64 / (n.max(2) - 1) as f64;
+            minus * (1.0 - fraction) + plus * fraction
+        })
+    }
+}
+
+/// The flat rectangle 0 ≤ y ≤ U, |z| ≤ V/2.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Board {
+    pub(super) length: f64,
+    pub(super) half_width: f64,
+}
+
+impl Board {
+    pub(super) fn of(spine: &Spine) -> Self {
+        Self {
+            length: spine.length(),
+            half_width: 0.5 * spine.width,
+        }
+    }
+
+    pub(super) fn corners(&self) -> [Vector2<f64>; 4] {
+        let (length, z) = (self.length, self.half_width);
+        [(0.0, -z), (0.0, z), (length, -z), (length, z)].map(|(y, z)| Vector2::new(y, z))
+    }
+
+    /// Flat lengths below this are one point: far above a solver's residuals, far below what is drawn or made.
+    pub(super) fn tolerance(&self) -> f64 {
+        2e-6 * self.half_width
+    }
+
+    /// The flat ends of the rib through P(u), on the −ζ and on the +ζ side.
+    ///
+    /// Ends within the tolerance of a corner are put on it: a rib that a solver left square to ten digits ends
+    /// at the corners and not on its own end line.
+    pub(super) fn rib_ends(&self, u: f64, slope: f64) -> [Vector2<f64>; 2] {
+        [-self.half_width, self.half_width].map(|z| self.rib_end(u, slope, z))
+    }
+
+    fn rib_end(&self, u: f64, slope: f64, z: f64) -> Vector2<f64> {
+        let y = edge_foot(u, slope, z);
+        let inside = y.clamp(0.0, self.length);
+        if (y - inside).abs() <= self.tolerance() {
+            return Vector2::new(self.snapped_to_end(inside), z);
+        }
+        let v = (u - inside) / slope;
+        let at_corner = (z - v).abs() <= self.tolerance();
+        Vector2::new(inside, if at_corner { z } else { v })
+    }
+
+    fn snapped_to_end(&self, y: f64) -> f64 {
+        let near = |end: f64| (y - end).abs() <= self.tolerance();
+        [0.0, self.length]
+            .into_iter()
+            .find(|&end| near(end))
+            .unwrap_or(y)
+    }
+
+    fn contains(&self, y: f64, z: f64) -> bool {
+        let margin = self.tolerance();
+        (-margin..=self.length + margin).contains(&y) && z.abs() <= self.half_width + margin
+    }
+}
+
+/// The ribs at all nodes, clipped to the board.
+///
+/// At an end without a square rib they leave through the end line; the corner that no rib reaches is flat.
+pub fn ribs(spine: &Spine) -> Vec<Rib> {
+    let board = Board::of(spine);
+    (0..spine.u.len())
+        .map(|node| Rib::on(&board, &spine.node(node)))
+        .collect()
+}
+
+/// The ends of the ribs at all nodes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Edges {
+    /// Ends on the −ζ side.
+    pub minus: Vec<Vector3<f64>>,
+    /// Ends on the +ζ side.
+    pub plus: Vec<Vector3<f64>>,
+}
+
+/// The ends of the ribs at all nodes, clipped to the board.
+///
+/// Source: Eq. (21)
+pub fn edges(spine: &Spine) -> Edges {
+    let ribs = ribs(spine);
+    Edges {
+        minus: ribs.iter().map(|rib| rib.point(rib.v_minus)).collect(),
+        plus: ribs.iter().map(|rib| rib.point(rib.v_plus)).collect(),
+    }
+}
+
+/// `n_across` points along the rib of every node, evenly from its −ζ end to its +ζ end.
+///
+/// The first and the last of each row are the [`edges`].
+///
+/// Shapes: nodes × `n_across`
+pub fn points(spine: &Spine, n_across: usize) -> Vec<Vec<Vector3<f64>>> {
+    let row = |rib: &Rib| rib.stations(n_across).map(|v| rib.point(v)).collect();
+    ribs(spine).iter().map(row).collect()
+}
+
+/// The deformed point of the flat point (y, z), or `None` off the board.
+///
+/// In a corner that no rib reaches the surface is the tangent plane of the nearest end.
+///
+/// # Panics
+///
+/// If the spine has no nodes.
+pub fn material_point(spine: &Spine, y: f64, z: f64) -> Option<Vector3<f64>> {
+    let board = Board::of(spine);
+    board.contains(y, z).then(|| {
+        let u = rib_foot(spine, y, z);
+        // On a rib y − u = −z β: one formula for ribs and tangent planes.
+        spine.at(u).pose.transform(&Vector3::new(0.0, y - u, z))
+    })
+}
+
+/// Arc length of the foot of the rib through the flat point (y, z), held to [0, U] where no rib reaches the point.
+///
+/// It is found by bisection, because u − z β(u) rises with u as long as ribs do not cross.
+///
+/// # Panics
+///
+/// If the spine has no nodes.
+pub fn rib_foot(spine: &Spine, y: f64, z: f64) -> f64 {
+    let excess = |node: usize| edge_foot(spine.u[node], spine.rib_slope[node], z) - y;
+    let (mut low, mut high) = (0, spine.u.len() - 1);
+    if excess(low) >= 0.0 {
+        return spine.u[low];
+    }
+    if excess(high) <= 0.0 {
+        return spine.u[high];
+    }
+    while high - low > 1 {
+        let middle = low.midpoint(high);
+        if excess(middle) < 0.0 {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    let fraction = excess(low) / (excess(low) - excess(high));
+    spine.u[low] + fraction * (spine.u[high] - spine.u[low])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::surface::samples::{spine, waves};
+    use approx::assert_relative_eq;
+    use proptest::prelude::*;
+
+    fn wrap(a: f64, radius: f64) -> Spine {
+        spine(1.0, 0.2, 60, |_| a.cos().powi(2) / radius, |_| a.tan())
+    }
+
+    /// Distance of a point from the axis of the cylinder that `wrap` is wound on.
+    fn distance_from_axis(spine: &Spine, a: f64, radius: f64, point: &Vector3<f64>) -> f64 {
+        let start = spine.pose[0];
+        let axis = start.frame * Vector3::new(0.0, -a.sin(), a.cos());
+        (point - start.transform(&Vector3::new(-radius, 0.0, 0.0)))
+            .cross(&axis)
+            .norm()
+    }
+
+    #[test]
+    fn test_points_of_a_wrap_lie_on_its_cylinder() {
+        for (a, radius) in [(0.5f64, 0.3), (-0.8, 0.7), (1.2, 0.1)] {
+            let spine = wrap(a, radius);
+            for point in points(&spine, 7).iter().flatten() {
+                assert_relative_eq!(
+                    distance_from_axis(&spine, a, radius, point),
+                    radius,
+                    epsilon = 1e-12
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn test_rows_of_points_begin_and_end_on_the_edges() {
+        let spine = spine(1.0, 0.1, 30, |u| 3.0 * u, |u| 0.4 - u);
+        let edges = edges(&spine);
+        for (i, row) in points(&spine, 5).iter().enumerate() {
+            assert_eq!(
+                (row.len(), row[0], row[4]),
+                (5, edges.minus[i], edges.plus[i])
+            );
+        }
+    }
+
+    #[test]
+    fn test_ribs_of_square_ends_span_the_width() {
+        let spine = spine(1.0, 0.1, 30, |u| 3.0 * u, |u| u * (1.0 - u) + 1e-9);
+        for rib in [ribs(&spine)[0], ribs(&spine)[30]] {
+            assert_eq!((rib.v_minus, rib.v_plus), (-0.05, 0.05));
+        }
+    }
+
+    #[test]
+    fn test_last_ribs_of_a_free_end_leave_through_the_end_line() {
+        let spine = spine(1.0, 0.1, 100, |u| 3.0 * u, |_| 1.0);
+        let ribs = ribs(&spine);
+        assert_relative_eq!(ribs[2].v_plus, 0.02, epsilon = 1e-14);
+        assert_eq!(
+            (ribs[2].v_minus, ribs[50].v_plus, ribs[0].v_plus),
+            (-0.05, 0.05, 0.0)
+        );
+        assert_relative_eq!(ribs[98].v_minus, -0.02, epsilon = 1e-14);
+    }
+
+    #[test]
+    fn test_rib_angle_has_the_slope_of_the_rates() {
+        for (bend, slope) in [(2.0, 0.7), (-2.0, 0.7), (0.5, -3.0)] {
+            let torsion = crate::surface::torsion(bend, slope);
+            let angle = rib_angle_from_rates(bend, torsion).unwrap_or(f64::NAN);
+            assert_relative_eq!(angle, rib_angle(slope), epsilon = 1e-15);
+        }
+        assert_eq!(rib_angle_from_rates(0.0, 0.0), None);
+    }
+
+    #[test]
+    fn test_rib_bounds_are_one_bound() {
+        // dα/du = β' cos² α
+        let alpha = rib_angle(0.8);
+        let rate = rib_convergence_bound(0.1) * alpha.cos().powi(2);
+        assert_relative_eq!(rib_angle_rate_bound(alpha, 0.1), rate, epsilon = 1e-14);
+        assert_eq!(rib_convergence(3.0, 2.0, 0.5), 5.5);
+    }
+
+    #[test]
+    fn test_rib_and_bend_vectors_are_unit_and_square() {
+        let pose = wrap(0.5, 0.3).pose[20];
+        let (rib, bend) = (rib_vector(&pose, 0.7), bend_vector(&pose, 0.7));
+        assert_relative_eq!(rib.norm(), 1.0, epsilon = 1e-14);
+        assert_relative_eq!(
+            bend.cross(&rib),
+            pose.frame.column(0).into_owned(),
+            epsilon = 1e-14
+        );
+    }
+
+    #[test]
+    fn test_points_off_the_board_are_none() {
+        let spine = wrap(0.5, 0.3);
+        for (y, z) in [
+            (-0.01, 0.0),
+            (1.01, 0.0),
+            (0.5, 0.11),
+            (0.5, -0.11),
+            (f64::NAN, 0.0),
+        ] {
+            assert_eq!(material_point(&spine, y, z), None);
+        }
+    }
+
+    #[test]
+    fn test_ends_of_ribs_are_their_own_material_points() {
+        let spine = spine(1.0, 0.1, 50, |u| 4.0 * u - 1.0, |u| 0.6 - 1.1 * u);
+        for rib in ribs(&spine) {
+            for v in rib.stations(4) {
+                let flat = rib.flat_point(v);
+                let point = material_point(&spine, flat.x, flat.y).unwrap_or_default();
+                assert_relative_eq!(point, rib.point(v), epsilon = 1e-12);
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn test_material_points_keep_lengths_and_angles(
+            (bend, slope) in waves(15.0), y in 0.02..0.98f64, z in -0.045..0.045f64,
+        ) {
+            let spine = spine(1.0, 0.1, 400, |u| bend.at(u), |u| slope.at(u));
+            let h = 1e-5;
+            let x = |dy: f64, dz: f64| material_point(&spine, y + dy, z + dz).unwrap_or_default();
+            let along = (x(h, 0.0) - x(-h, 0.0)) / (2.0 * h);
+            let across = (x(0.0, h) - x(0.0, -h)) / (2.0 * h);
+            prop_assert!((along.norm() - 1.0).abs() < 2e-3);
+            prop_assert!((across.norm() - 1.0).abs() < 2e-3);
+            prop_assert!(along.dot(&across).abs() < 2e-3);
+        }
+    }
+}
