@@ -12,5 +12,6 @@ pub mod energy;
 pub mod error;
 pub mod lie;
 pub mod scenario;
+pub mod solver;
 pub mod spine;
 pub mod surface;

@@ -1,0 +1,592 @@
+//! The main loop: barrier, step, line search, restoration.
+
+use super::chain::{NodeVector, Stage};
+use super::filter::{Filter, Measure};
+use super::newton::Newton;
+use super::{
+    BOUNDS, Bounds, Linearisation, Outcome, Program, Residuals, Rows, Settings, Solution, Values,
+    add_controls, larger,
+};
+use std::ops::ControlFlow;
+
+/// Minimises a programme from a point of its domain.
+///
+/// `proceed` is asked once an iteration whether to go on.
+pub fn minimise<P: Program>(
+    program: &P,
+    settings: &Settings,
+    start: P::Point,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Solution<P::Point> {
+    let mut state = State::new(program, *settings, start);
+    let outcome = state.iterate(proceed);
+    state.finish(outcome)
+}
+
+/// Everything that changes from one iteration to the next.
+struct State<'a, P: Program> {
+    program: &'a P,
+    settings: Settings,
+    weights: Vec<f64>,
+    point: P::Point,
+    values: Values,
+    multipliers: Vec<Rows>,
+    bound_multipliers: Bounds,
+    barrier: f64,
+    iteration: usize,
+    linear: Linearisation,
+    newton: Newton,
+    filter: Filter,
+    trial: P::Point,
+    trial_values: Values,
+    bound_step: Bounds,
+    gradient: Vec<NodeVector>,
+    targets: Vec<Rows>,
+    plain_step: Vec<NodeVector>,
+    plain_multiplier_step: Vec<Rows>,
+}
+
+/// How far a step may go: along the unknowns and along the bounds' multipliers.
+#[derive(Clone, Copy)]
+struct Lengths {
+    primal: f64,
+    dual: f64,
+}
+
+impl<'a, P: Program> State<'a, P> {
+    fn new(program: &'a P, settings: Settings, mut point: P::Point) -> Self {
+        let weights = program.weights();
+        let linear = Linearisation::new(program.stages(), &program.constrained_nodes());
+        let newton = Newton::new(&linear, &weights);
+        let mut values = Values::default();
+        program.evaluate(&mut point, &mut values);
+        let rows = vec![Rows::zeros(); linear.constraints.len()];
+        let bounds = vec![[0.0; BOUNDS]; weights.len()];
+        let mut state = Self {
+            program,
+            settings,
+            filter: Filter::new(violation(&values)),
+            trial: point.clone(),
+            trial_values: values.clone(),
+            point,
+            values,
+            multipliers: rows.clone(),
+            bound_multipliers: bounds.clone(),
+            barrier: settings.barrier,
+            iteration: 0,
+            gradient: linear.gradient.clone(),
+            plain_step: linear.gradient.clone(),
+            linear,
+            newton,
+            bound_step: bounds,
+            targets: rows.clone(),
+            plain_multiplier_step: rows,
+            weights,
+        };
+        state.centre_bound_multipliers();
+        state.linearise();
+        state
+    }
+
+    fn iterate(&mut self, proceed: &mut dyn FnMut() -> ControlFlow<()>) -> Outcome {
+        loop {
+            if self.residuals(0.0).largest() <= self.settings.tolerance {
+                return Outcome::Converged;
+            }
+            if self.iteration >= self.settings.iterations {
+                return Outcome::IterationLimit;
+            }
+            if proceed().is_break() {
+                return Outcome::Interrupted;
+            }
+            self.lower_barrier();
+            self.newton
+                .assemble(&self.linear, &self.values, &self.bound_multipliers);
+            if self.newton.factorise().is_err() {
+                return Outcome::Unbounded;
+            }
+            self.find_step();
+            if !self.search() && !self.restore(proceed) {
+                return Outcome::LocallyInfeasible;
+            }
+            self.linearise();
+            self.iteration += 1;
+        }
+    }
+
+    fn finish(mut self, outcome: Outcome) -> Solution<P::Point> {
+        self.newton
+            .assemble(&self.linear, &self.values, &self.bound_multipliers);
+        let curvature = self.newton.curvature();
+        Solution {
+            residuals: self.residuals(0.0),
+            point: self.point,
+            values: self.values,
+            multipliers: self.multipliers,
+            iterations: self.iteration,
+            outcome,
+            curvature,
+        }
+    }
+
+    fn linearise(&mut self) {
+        self.program
+            .linearise(&self.point, &self.multipliers, &mut self.linear);
+    }
+
+    /// Residuals of the conditions in which slack times multiplier is `barrier` times the stage's weight.
+    fn residuals(&mut self, barrier: f64) -> Residuals {
+        self.gradient.copy_from_slice(&self.linear.gradient);
+        let mut complementarity = 0.0;
+        for (k, multipliers) in self.bound_multipliers.iter().enumerate() {
+            for (b, multiplier) in multipliers.iter().enumerate() {
+                add_controls(
+                    &mut self.gradient,
+                    k,
+                    &(-*multiplier * self.linear.slacks[k][b]),
+                );
+                let product = multiplier * self.values.slacks[k][b] - barrier * self.weights[k];
+                complementarity = larger(complementarity, product.abs());
+            }
+        }
+        Residuals {
+            stationarity: largest(self.gradient.iter().flatten()),
+            constraint: largest(self.values.constraints.iter().flatten()),
+            complementarity,
+        }
+    }
+
+    /// Lowers the barrier while its problem is solved well enough.
+    fn lower_barrier(&mut self) {
+        const SOLVED: f64 = 10.0;
+        let heaviest = largest(self.weights.iter());
+        let least = 0.1 * self.settings.tolerance / heaviest;
+        while self.barrier > least
+            && self.residuals(self.barrier).largest() <= SOLVED * self.barrier * heaviest
+        {
+            self.barrier = least.max((0.2 * self.barrier).min(self.barrier.powf(1.5)));
+            self.filter.clear();
+        }
+    }
+
+    /// Newton step of the barrier problem.
+    fn find_step(&mut self) {
+        self.find_barrier_gradient();
+        self.newton
+            .solve(&self.linear, &self.gradient, &self.values.constraints);
+    }
+
+    /// Gradient of the barrier problem's Lagrangian.
+    fn find_barrier_gradient(&mut self) {
+        self.gradient.copy_from_slice(&self.linear.gradient);
+        for (k, slacks) in self.values.slacks.iter().enumerate() {
+            let push = self.barrier * self.weights[k];
+            for (b, slack) in slacks.iter().enumerate() {
+                add_controls(
+                    &mut self.gradient,
+                    k,
+                    &(-push / slack * self.linear.slacks[k][b]),
+                );
+            }
+        }
+    }
+
+    /// Derivative of the barrier function along the step.
+    fn slope(&self) -> f64 {
+        let along: f64 = self
+            .gradient
+            .iter()
+            .zip(&self.newton.step)
+            .map(|(gradient, step)| gradient.dot(step))
+            .sum();
+        along - self.newton.constraint_work(&self.linear, &self.multipliers)
+    }
+
+    /// Violation and barrier function of some values.
+    fn measure(&self, values: &Values) -> Measure {
+        let logarithms: f64 = values
+            .slacks
+            .iter()
+            .zip(&self.weights)
+            .map(|(slacks, weight)| weight * slacks.iter().map(|slack| slack.ln()).sum::<f64>())
+            .sum();
+        Measure {
+            violation: violation(values),
+            merit: values.objective - self.barrier * logarithms,
+        }
+    }
+
+    /// Step of the bounds' multipliers, and the lengths that keep slacks and multipliers positive.
+    fn find_bound_step(&mut self) -> Lengths {
+        let keep = (1.0 - self.barrier).clamp(0.99, 1.0 - 1e-9);
+        let mut lengths = Lengths {
+            primal: 1.0,
+            dual: 1.0,
+        };
+        for (k, steps) in self.bound_step.iter_mut().enumerate() {
+            for (b, step) in steps.iter_mut().enumerate() {
+                let (slack, multiplier) = (self.values.slacks[k][b], self.bound_multipliers[k][b]);
+                let rate = self.newton.slack_rate(&self.linear, k, b);
+                *step = (self.barrier * self.weights[k] - multiplier * rate) / slack - multiplier;
+                if rate < 0.0 {
+                    lengths.primal = lengths.primal.min(-keep * slack / rate);
+                }
+                if *step < 0.0 {
+                    lengths.dual = lengths.dual.min(-keep * multiplier / *step);
+                }
+            }
+        }
+        lengths
+    }
+
+    /// Shortens the step until the filter takes the trial point; false where it takes none.
+    fn search(&mut self) -> bool {
+        const SHORTEST: f64 = 1e-10;
+        let longest = self.find_bound_step();
+        let (now, slope) = (self.measure(&self.values), self.slope());
+        let mut length = longest.primal;
+        while length > SHORTEST {
+            if self.try_step(length) {
+                let trial = self.measure(&self.trial_values);
+                let taken = self.filter.takes(now, trial, length, slope)
+                    || (length == longest.primal
+                        && trial.violation >= now.violation
+                        && self.correct(now, length, slope));
+                if taken {
+                    self.accept(length, longest.dual);
+                    return true;
+                }
+            }
+            length *= 0.5;
+        }
+        false
+    }
+
+    /// Second-order correction: bends the full step back to the constraints until the filter takes it.
+    fn correct(&mut self, now: Measure, length: f64, slope: f64) -> bool {
+        const MOST: usize = 4;
+        const CONTRACTION: f64 = 0.99;
+        self.plain_step.copy_from_slice(&self.newton.step);
+        self.plain_multiplier_step
+            .copy_from_slice(&self.newton.multiplier_step);
+        self.targets.copy_from_slice(&self.values.constraints);
+        let mut scale = length;
+        let mut before = violation(&self.trial_values);
+        let mut taken = false;
+        for _ in 0..MOST {
+            for (target, value) in self.targets.iter_mut().zip(&self.trial_values.constraints) {
+                *target = *target * scale + value;
+            }
+            self.newton
+                .solve(&self.linear, &self.gradient, &self.targets);
+            scale = self.find_bound_step().primal;
+            if !self.try_step(scale) {
+                break;
+            }
+            let trial = self.measure(&self.trial_values);
+            taken = self.filter.takes(now, trial, length, slope);
+            if taken || trial.violation > CONTRACTION * before {
+                break;
+            }
+            before = trial.violation;
+        }
+        self.newton.step.copy_from_slice(&self.plain_step);
+        self.newton
+            .multiplier_step
+            .copy_from_slice(&self.plain_multiplier_step);
+        self.find_bound_step();
+        taken
+    }
+
+    /// Evaluates the trial point; false outside the domain.
+    fn try_step(&mut self, length: f64) -> bool {
+        self.program
+            .retract(&self.point, &self.newton.step, length, &mut self.trial);
+        self.program
+            .evaluate(&mut self.trial, &mut self.trial_values)
+    }
+
+    /// Takes the trial point and moves the multipliers along.
+    fn accept(&mut self, primal: f64, dual: f64) {
+        const SPREAD: f64 = 1e10;
+        self.take_trial();
+        for (multiplier, step) in self
+            .multipliers
+            .iter_mut()
+            .zip(&self.newton.multiplier_step)
+        {
+            *multiplier += primal * step;
+        }
+        for (k, multipliers) in self.bound_multipliers.iter_mut().enumerate() {
+            for (b, multiplier) in multipliers.iter_mut().enumerate() {
+                let central = self.barrier * self.weights[k] / self.values.slacks[k][b];
+                *multiplier = (*multiplier + dual * self.bound_step[k][b])
+                    .clamp(central / SPREAD, central * SPREAD);
+            }
+        }
+    }
+
+    fn take_trial(&mut self) {
+        std::mem::swap(&mut self.point, &mut self.trial);
+        std::mem::swap(&mut self.values, &mut self.trial_values);
+    }
+
+    /// Feasibility restoration: steps of least length toward the constraints until the filter takes the point; false
+    /// where the violation cannot be lowered.
+    fn restore(&mut self, proceed: &mut dyn FnMut() -> ControlFlow<()>) -> bool {
+        const ENOUGH: f64 = 0.1;
+        let left = self.measure(&self.values);
+        self.filter.leave(left);
+        self.multipliers.fill(Rows::zeros());
+        while self.iteration < self.settings.iterations && proceed().is_continue() {
+            self.iteration += 1;
+            self.centre_bound_multipliers();
+            if !self.step_toward_constraints() {
+                return false;
+            }
+            let now = self.measure(&self.values);
+            if now.violation <= ENOUGH * left.violation && self.filter.admits(now) {
+                self.centre_bound_multipliers();
+                return true;
+            }
+        }
+        true
+    }
+
+    /// One step of least length toward the constraints, shortened until the violation falls.
+    fn step_toward_constraints(&mut self) -> bool {
+        const SHORTEST: f64 = 1e-8;
+        const SUFFICIENT: f64 = 1e-4;
+        self.linearise();
+        for stage in &mut self.linear.chain.stages {
+            *stage = Stage {
+                state_by_state: stage.state_by_state,
+                state_by_first: stage.state_by_first,
+                state_by_second: stage.state_by_second,
+                ..Stage::zero()
+            };
+        }
+        self.linear.gradient.fill(NodeVector::zeros());
+        self.newton
+            .assemble(&self.linear, &self.values, &self.bound_multipliers);
+        if self.newton.factorise_damped(self.barrier.sqrt()).is_err() {
+            return false;
+        }
+        self.find_step();
+        let before = self.violation();
+        let mut length = self.find_bound_step().primal;
+        while length > SHORTEST {
+            if self.try_step(length)
+                && violation(&self.trial_values) <= (1.0 - SUFFICIENT * length) * before
+            {
+                self.take_trial();
+                return true;
+            }
+            length *= 0.5;
+        }
+        false
+    }
+
+    fn violation(&self) -> f64 {
+        violation(&self.values)
+    }
+
+    /// Puts the bounds' multipliers on the central path.
+    fn centre_bound_multipliers(&mut self) {
+        for (k, multipliers) in self.bound_multipliers.iter_mut().enumerate() {
+            let push = self.barrier * self.weights[k];
+            *multipliers = self.values.slacks[k].map(|slack| push / slack);
+        }
+    }
+}
+
+/// 1-norm of the constraint violation.
+fn violation(values: &Values) -> f64 {
+    values.constraints.iter().map(|rows| rows.lp_norm(1)).sum()
+}
+
+/// Largest absolute value; NaN where one is.
+fn largest<'a>(numbers: impl Iterator<Item = &'a f64>) -> f64 {
+    numbers.fold(0.0, |most, x| larger(most, x.abs()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::RowsByNode;
+    use super::*;
+    use nalgebra::Vector4;
+
+    const STAGES: usize = 8;
+
+    /// A cart pushed along a line: its position is carried by the mean push of each stage, it must arrive at `goal`,
+    /// the pushes cost their square, and their change is bounded. Nothing of it is a belt.
+    struct Cart {
+        goal: f64,
+        steepest: f64,
+    }
+
+    #[derive(Debug, Clone, PartialEq)]
+    struct Ride {
+        position: Vec<f64>,
+        push: Vec<[f64; 2]>,
+    }
+
+    const SHARE: f64 = 1.0 / STAGES as f64;
+
+    impl Cart {
+        fn rate(&self, ride: &Ride, stage: usize) -> f64 {
+            (ride.push[stage + 1][0] - ride.push[stage][0]) / SHARE / self.steepest
+        }
+
+        fn start(&self) -> Ride {
+            Ride {
+                position: vec![0.0; STAGES + 1],
+                push: vec![[0.0; 2]; STAGES + 1],
+            }
+        }
+    }
+
+    impl Program for Cart {
+        type Point = Ride;
+
+        fn stages(&self) -> usize {
+            STAGES
+        }
+
+        fn constrained_nodes(&self) -> Vec<usize> {
+            vec![0, STAGES]
+        }
+
+        fn weights(&self) -> Vec<f64> {
+            vec![SHARE; STAGES]
+        }
+
+        fn evaluate(&self, ride: &mut Ride, values: &mut Values) -> bool {
+            values.objective = 0.0;
+            values.slacks.clear();
+            for k in 0..STAGES {
+                let mean = 0.5 * (ride.push[k][0] + ride.push[k + 1][0]);
+                ride.position[k + 1] = ride.position[k] + SHARE * mean;
+                values.objective += 0.5 * SHARE * (mean * mean + ride.push[k][1].powi(2));
+                let rate = self.rate(ride, k);
+                values.slacks.push([1.0 - rate, 1.0 + rate]);
+            }
+            let mut held = [Rows::zeros(), Rows::zeros()];
+            held[0][0] = ride.position[0];
+            held[0][6] = ride.push[0][0];
+            held[1][0] = ride.position[STAGES] - self.goal;
+            values.constraints = held.to_vec();
+            values.slacks.iter().flatten().all(|slack| *slack > 0.0)
+        }
+
+        fn linearise(&self, ride: &Ride, multipliers: &[Rows], into: &mut Linearisation) {
+            into.gradient.fill(NodeVector::zeros());
+            let arrival = multipliers[1][0];
+            for k in 0..STAGES {
+                let mean = 0.5 * (ride.push[k][0] + ride.push[k + 1][0]);
+                let stage = &mut into.chain.stages[k];
+                stage.state_by_state.fill_with_identity();
+                stage.state_by_first[(0, 0)] = 0.5 * SHARE;
+                stage.state_by_second[(0, 0)] = 0.5 * SHARE;
+                let by_mean = Vector4::new(0.5, 0.0, 0.5, 0.0);
+                stage.controls = SHARE * by_mean * by_mean.transpose();
+                stage.controls[(1, 1)] += SHARE;
+                let pull = SHARE * (mean + arrival) * by_mean;
+                add_controls(&mut into.gradient, k, &pull);
+                into.gradient[k][7] += SHARE * ride.push[k][1];
+                let by_rate = Vector4::new(-1.0, 0.0, 1.0, 0.0) / SHARE / self.steepest;
+                into.slacks[k] = [-by_rate, by_rate];
+            }
+            into.gradient[0][0] = arrival + multipliers[0][0];
+            into.gradient[0][6] += multipliers[0][6];
+            into.constraints = vec![RowsByNode::zeros(); 2];
+            into.constraints[0][(0, 0)] = 1.0;
+            into.constraints[0][(6, 6)] = 1.0;
+            into.constraints[1][(0, 0)] = 1.0;
+        }
+
+        fn retract(&self, ride: &Ride, step: &[NodeVector], length: f64, into: &mut Ride) {
+            into.position[0] = ride.position[0] + length * step[0][0];
+            for k in 0..=STAGES {
+                into.push[k] = [0, 1].map(|i| ride.push[k][i] + length * step[k][6 + i]);
+            }
+        }
+    }
+
+    fn settings() -> Settings {
+        Settings {
+            tolerance: 1e-9,
+            iterations: 100,
+            barrier: 1.0,
+        }
+    }
+
+    fn solved(cart: &Cart) -> Solution<Ride> {
+        minimise(cart, &settings(), cart.start(), &mut || {
+            ControlFlow::Continue(())
+        })
+    }
+
+    #[test]
+    fn test_bound_is_active_where_the_free_optimum_breaks_it() {
+        let cart = Cart {
+            goal: 1.0,
+            steepest: 4.0,
+        };
+        let solution = solved(&cart);
+        assert_eq!(solution.outcome, Outcome::Converged);
+        assert!(solution.residuals.largest() <= 1e-9);
+        // From rest the push rises as steeply as it may, to means of 1/4 and 3/4; the other six share the rest.
+        let push: Vec<f64> = solution.point.push.iter().map(|push| push[0]).collect();
+        let means: Vec<f64> = push
+            .windows(2)
+            .map(|pair| 0.5 * (pair[0] + pair[1]))
+            .collect();
+        for (mean, expected) in means
+            .iter()
+            .zip([0.25, 0.75].into_iter().chain([7.0 / 6.0; 6]))
+        {
+            assert!((mean - expected).abs() < 1e-5, "{means:?}");
+        }
+        assert!((solution.point.position[STAGES] - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn test_multiplier_is_minus_the_slope_of_the_least_objective() {
+        let least = |goal: f64| {
+            solved(&Cart {
+                goal,
+                steepest: 4.0,
+            })
+        };
+        let (below, here, above) = (least(0.999), least(1.0), least(1.001));
+        let slope = (above.values.objective - below.values.objective) / 0.002;
+        assert!((slope + here.multipliers[1][0]).abs() < 1e-5 * slope.abs());
+    }
+
+    #[test]
+    fn test_goal_out_of_reach_is_locally_infeasible() {
+        let cart = Cart {
+            goal: 10.0,
+            steepest: 1.0,
+        };
+        let solution = solved(&cart);
+        assert_ne!(solution.outcome, Outcome::Converged);
+        assert!(solution.residuals.constraint > 1.0);
+    }
+
+    #[test]
+    fn test_caller_may_end_it() {
+        let cart = Cart {
+            goal: 1.0,
+            steepest: 4.0,
+        };
+        let solution = minimise(&cart, &settings(), cart.start(), &mut || {
+            ControlFlow::Break(())
+        });
+        assert_eq!(
+            (solution.outcome, solution.iterations),
+            (Outcome::Interrupted, 0)
+        );
+    }
+}

@@ -1,0 +1,193 @@
+//! Primal–dual interior-point minimisation on a chain of nodes.
+//!
+//! A numerical library of its own: it knows nodes, the stages between them, constraints at nodes and inequalities at
+//! stages, and nothing of belts. Every iteration costs time linear in the length of the chain. The algorithm is that
+//! of A. Wächter and L. T. Biegler, "On the implementation of an interior-point filter line-search algorithm for
+//! large-scale nonlinear programming" (2006), on the stage-wise linear algebra of [`chain`].
+
+pub mod chain;
+mod filter;
+mod interior_point;
+mod newton;
+
+pub use interior_point::minimise;
+
+use chain::{Chain, NodeMatrix, NodeTerm, NodeVector, Stage};
+use nalgebra::{SMatrix, SVector, Vector4};
+
+/// Most equality constraints at one node.
+pub const ROWS: usize = 7;
+/// Inequalities at one stage.
+pub const BOUNDS: usize = 2;
+
+/// Values or multipliers of the constraints of one node; unused rows are zero.
+pub type Rows = SVector<f64, ROWS>;
+/// Derivative of the constraints of one node by its unknowns; unused rows are zero.
+pub type RowsByNode = SMatrix<f64, ROWS, 8>;
+/// Multipliers of the inequalities, or any other number for each of them, stage by stage.
+pub type Bounds = Vec<[f64; BOUNDS]>;
+
+/// What a programme is worth at a point.
+#[derive(Debug, Clone, Default)]
+pub struct Values {
+    /// Objective.
+    pub objective: f64,
+    /// Constraint values, one entry a constrained node.
+    pub constraints: Vec<Rows>,
+    /// Inequalities of every stage: admissible where positive.
+    pub slacks: Bounds,
+}
+
+/// A programme to second order at a point.
+#[derive(Debug, Clone)]
+pub struct Linearisation {
+    /// Second derivatives of the Lagrangian of the equalities.
+    pub chain: Chain,
+    /// Gradient of the Lagrangian of the equalities, by the unknowns of every node.
+    pub gradient: Vec<NodeVector>,
+    /// Constraint derivatives, one entry a constrained node.
+    pub constraints: Vec<RowsByNode>,
+    /// Derivatives of the inequalities by both controls of their stage.
+    pub slacks: Vec<[Vector4<f64>; BOUNDS]>,
+}
+
+/// What the solver needs to know of a programme.
+///
+/// The state of a node is not an unknown: it is carried along the chain from the first one, so that a point is always
+/// consistent. The unknowns are the state of the first node and the controls of all.
+pub trait Program {
+    /// A point of the search space, which need not be a vector space.
+    type Point: Clone;
+
+    /// Number of stages.
+    fn stages(&self) -> usize;
+
+    /// The constrained nodes, rising.
+    fn constrained_nodes(&self) -> Vec<usize>;
+
+    /// The share of each stage in the whole, its weight in barrier and damping.
+    fn weights(&self) -> Vec<f64>;
+
+    /// Carries the states of a point along the chain and evaluates it; false outside the domain.
+    fn evaluate(&self, point: &mut Self::Point, values: &mut Values) -> bool;
+
+    /// Derivatives at a point that has been evaluated, of the objective plus multipliers times constraints.
+    fn linearise(&self, point: &Self::Point, multipliers: &[Rows], into: &mut Linearisation);
+
+    /// Moves the unknowns of a point along a step; the states still have to be carried on.
+    fn retract(
+        &self,
+        point: &Self::Point,
+        step: &[NodeVector],
+        length: f64,
+        into: &mut Self::Point,
+    );
+}
+
+/// Settings of the minimisation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Largest residual of a converged point.
+    pub tolerance: f64,
+    /// Most iterations.
+    pub iterations: usize,
+    /// First barrier parameter, an objective per unit weight.
+    pub barrier: f64,
+}
+
+/// Why the minimisation ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// All residuals are within the tolerance.
+    Converged,
+    /// The iteration limit was reached.
+    IterationLimit,
+    /// The violation of the constraints cannot be lowered any further.
+    LocallyInfeasible,
+    /// The objective is not bounded below, or not finite.
+    Unbounded,
+    /// The caller asked to end.
+    Interrupted,
+}
+
+/// Residuals of the first-order conditions, max-norms.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Residuals {
+    /// Gradient of the Lagrangian by the unknowns.
+    pub stationarity: f64,
+    /// Violation of the constraints.
+    pub constraint: f64,
+    /// Products of slacks and their multipliers.
+    pub complementarity: f64,
+}
+
+impl Residuals {
+    /// The largest of the three; NaN where one of them is.
+    pub fn largest(&self) -> f64 {
+        [self.stationarity, self.constraint, self.complementarity]
+            .into_iter()
+            .fold(0.0, larger)
+    }
+}
+
+/// The larger of two numbers; NaN where one of them is, so that no residual hides one.
+fn larger(a: f64, b: f64) -> f64 {
+    if b <= a { a } else { b }
+}
+
+/// Where the minimisation ended.
+#[derive(Debug, Clone)]
+pub struct Solution<P> {
+    /// The last point.
+    pub point: P,
+    /// Its values.
+    pub values: Values,
+    /// Multipliers of the constraints.
+    pub multipliers: Vec<Rows>,
+    /// Residuals there.
+    pub residuals: Residuals,
+    /// Iterations taken.
+    pub iterations: usize,
+    /// Why it ended.
+    pub outcome: Outcome,
+    /// Sign of the second variation there.
+    pub curvature: Curvature,
+}
+
+/// Sign of the second variation on the tangent space of the constraints.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Curvature {
+    /// Positive in every direction: a strict local minimum.
+    Positive,
+    /// Zero in some direction, as far as rounding lets one tell.
+    Marginal,
+    /// Negative in some direction: not a minimum.
+    Negative,
+}
+
+impl Linearisation {
+    /// Room for a programme with these constrained nodes.
+    pub fn new(stages: usize, constrained_nodes: &[usize]) -> Self {
+        let term = |node: &usize| NodeTerm {
+            node: *node,
+            hessian: NodeMatrix::zeros(),
+        };
+        Self {
+            chain: Chain {
+                stages: vec![Stage::zero(); stages],
+                nodes: constrained_nodes.iter().map(term).collect(),
+            },
+            gradient: vec![NodeVector::zeros(); stages + 1],
+            constraints: vec![RowsByNode::zeros(); constrained_nodes.len()],
+            slacks: vec![[Vector4::zeros(); BOUNDS]; stages],
+        }
+    }
+}
+
+/// Adds a derivative by both controls of a stage to the gradient.
+fn add_controls(gradient: &mut [NodeVector], stage: usize, by_controls: &Vector4<f64>) {
+    for (node, row) in [(stage, 0), (stage + 1, 2)] {
+        gradient[node][6] += by_controls[row];
+        gradient[node][7] += by_controls[row + 1];
+    }
+}

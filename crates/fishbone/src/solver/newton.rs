@@ -1,0 +1,147 @@
+//! The Newton system of a barrier problem: bounds eliminated, inertia controlled, constraints met exactly.
+
+use super::chain::{Chain, Factor, NodeVector, NotConvex};
+use super::{Bounds, Curvature, Linearisation, Rows, Values};
+
+/// Compliance lent to the constraints so that the chain can be factorised without them; refinement takes it back.
+const COMPLIANCE: f64 = 1e-7;
+const REFINEMENTS: usize = 2;
+
+/// The factorised Newton system and its solution, with the room it needs.
+#[derive(Debug, Clone)]
+pub(super) struct Newton {
+    chain: Chain,
+    factor: Factor,
+    node_weights: Vec<f64>,
+    damping: f64,
+    right: Vec<NodeVector>,
+    correction: Vec<NodeVector>,
+    /// Step of the unknowns.
+    pub(super) step: Vec<NodeVector>,
+    /// Step of the constraints' multipliers.
+    pub(super) multiplier_step: Vec<Rows>,
+}
+
+impl Newton {
+    pub(super) fn new(linear: &Linearisation, weights: &[f64]) -> Self {
+        let nodes = weights.len() + 1;
+        let half = |k: Option<usize>| k.and_then(|k| weights.get(k)).map_or(0.0, |w| 0.5 * w);
+        let zeros = vec![NodeVector::zeros(); nodes];
+        Self {
+            chain: linear.chain.clone(),
+            factor: Factor::new(weights.len()),
+            node_weights: (0..nodes)
+                .map(|k| half(k.checked_sub(1)) + half(Some(k)))
+                .collect(),
+            damping: 0.0,
+            right: zeros.clone(),
+            correction: zeros.clone(),
+            step: zeros,
+            multiplier_step: vec![Rows::zeros(); linear.constraints.len()],
+        }
+    }
+
+    /// Takes over second derivatives, with the bounds eliminated and the constraints as stiff springs.
+    pub(super) fn assemble(&mut self, linear: &Linearisation, values: &Values, bounds: &Bounds) {
+        self.chain.stages.copy_from_slice(&linear.chain.stages);
+        for (k, stage) in self.chain.stages.iter_mut().enumerate() {
+            for (b, gradient) in linear.slacks[k].iter().enumerate() {
+                let stiffness = bounds[k][b] / values.slacks[k][b];
+                stage.controls += stiffness * gradient * gradient.transpose();
+            }
+        }
+        for (i, term) in self.chain.nodes.iter_mut().enumerate() {
+            let jacobian = &linear.constraints[i];
+            term.hessian = linear.chain.nodes[i].hessian + jacobian.tr_mul(jacobian) / COMPLIANCE;
+        }
+    }
+
+    /// Factorises with just enough damping to be convex on the tangent space of the constraints.
+    pub(super) fn factorise(&mut self) -> Result<(), NotConvex> {
+        const FIRST: f64 = 1e-4;
+        const MOST: f64 = 1e12;
+        if self.factorise_damped(0.0).is_ok() {
+            return Ok(());
+        }
+        let known = self.damping > 0.0;
+        let mut damping = if known { self.damping / 3.0 } else { FIRST };
+        while damping < MOST {
+            if self.factorise_damped(damping).is_ok() {
+                self.damping = damping;
+                return Ok(());
+            }
+            damping *= if known { 8.0 } else { 100.0 };
+        }
+        Err(NotConvex)
+    }
+
+    /// Factorises with a given damping of the controls per unit weight.
+    pub(super) fn factorise_damped(&mut self, damping: f64) -> Result<(), NotConvex> {
+        self.chain
+            .factorise(damping, &self.node_weights, &mut self.factor)
+    }
+
+    /// Sign of the second variation of what was assembled.
+    pub(super) fn curvature(&mut self) -> Curvature {
+        const MARGIN: f64 = 1e-8;
+        if self.factorise_damped(-MARGIN).is_ok() {
+            Curvature::Positive
+        } else if self.factorise_damped(MARGIN).is_ok() {
+            Curvature::Marginal
+        } else {
+            Curvature::Negative
+        }
+    }
+
+    /// Finds the step of least cost whose constraints change by `−targets`, and the multipliers' step.
+    ///
+    /// The springs that stand for the constraints give way a little; pulling again by what is still missing (the
+    /// method of multipliers on the quadratic programme) makes them rigid.
+    pub(super) fn solve(
+        &mut self,
+        linear: &Linearisation,
+        gradient: &[NodeVector],
+        targets: &[Rows],
+    ) {
+        self.right.copy_from_slice(gradient);
+        self.step.fill(NodeVector::zeros());
+        self.multiplier_step.fill(Rows::zeros());
+        for _ in 0..=REFINEMENTS {
+            for (i, target) in targets.iter().enumerate() {
+                let pull =
+                    linear.constraints[i].tr_mul(&self.missing(linear, i, target)) / COMPLIANCE;
+                self.right[self.chain.nodes[i].node] += pull;
+            }
+            self.chain
+                .solve(&mut self.factor, &self.right, &mut self.correction);
+            for (step, correction) in self.step.iter_mut().zip(&self.correction) {
+                *step += correction;
+            }
+            for (i, target) in targets.iter().enumerate() {
+                let force = self.missing(linear, i, target) / COMPLIANCE;
+                self.multiplier_step[i] += force;
+            }
+            self.right.fill(NodeVector::zeros());
+        }
+    }
+
+    /// What the step still misses of a target.
+    fn missing(&self, linear: &Linearisation, i: usize, target: &Rows) -> Rows {
+        linear.constraints[i] * self.step[self.chain.nodes[i].node] + target
+    }
+
+    /// Change of a slack along the step, to first order.
+    pub(super) fn slack_rate(&self, linear: &Linearisation, stage: usize, bound: usize) -> f64 {
+        let by = &linear.slacks[stage][bound];
+        let (first, second) = (&self.step[stage], &self.step[stage + 1]);
+        by[0] * first[6] + by[1] * first[7] + by[2] * second[6] + by[3] * second[7]
+    }
+
+    /// Change of the multipliers' work on the constraints along the step, to first order.
+    pub(super) fn constraint_work(&self, linear: &Linearisation, multipliers: &[Rows]) -> f64 {
+        let work = |(i, rows): (usize, &Rows)| {
+            rows.dot(&(linear.constraints[i] * self.step[self.chain.nodes[i].node]))
+        };
+        multipliers.iter().enumerate().map(work).sum()
+    }
+}
