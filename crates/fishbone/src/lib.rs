@@ -7,10 +7,12 @@
 //! Equation numbers, as in `Eq. (34)`, are those of Wakamatsu, Arai and Hirai, "Fishbone Model for Belt Object
 //! Deformation".
 
+pub mod belt;
 pub mod element;
 pub mod energy;
 pub mod error;
 pub mod lie;
+pub mod program;
 pub mod scenario;
 pub mod solver;
 pub mod spine;
