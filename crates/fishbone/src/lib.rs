@@ -13,6 +13,7 @@ pub mod energy;
 pub mod error;
 pub mod lie;
 pub mod program;
+pub mod ritz;
 pub mod scenario;
 pub mod solver;
 pub mod spine;
