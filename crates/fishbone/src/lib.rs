@@ -10,9 +10,12 @@
 pub mod belt;
 pub mod element;
 pub mod energy;
+pub mod equilibrium;
 pub mod error;
+mod guess;
 pub mod lie;
 pub mod program;
+pub mod result;
 pub mod ritz;
 pub mod scenario;
 pub mod solver;

@@ -1,0 +1,105 @@
+//! From a scenario to an equilibrium.
+
+mod intrinsic;
+mod ritz;
+
+use crate::belt::Belt;
+use crate::scenario::{Method, Scenario};
+use crate::solver::Residuals;
+use crate::spine::Spine;
+use nalgebra::Vector3;
+use serde::Serialize;
+use std::ops::ControlFlow;
+
+/// How a solve ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Status {
+    /// All residuals are within the tolerance.
+    Converged,
+    /// No shape of the belt can meet the supports.
+    Infeasible,
+    /// The search ended without meeting the tolerance.
+    NotConverged,
+}
+
+/// A force and a moment about the point where they act, world axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wrench {
+    /// Force.
+    pub force: Vector3<f64>,
+    /// Moment.
+    pub moment: Vector3<f64>,
+}
+
+/// What a support does to the belt.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reaction {
+    /// Arc length of the support from the start.
+    pub at: f64,
+    /// Force and moment on the belt about the support point: the gradient of the least energy by the support's
+    /// translation and left, world-axes rotation.
+    pub wrench: Wrench,
+}
+
+/// The outcome of a solve, in the units of the scenario.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Equilibrium {
+    /// The input, normalised.
+    pub scenario: Scenario,
+    /// How the solve ended.
+    pub status: Status,
+    /// One line for people: how it ended, and what to try.
+    pub message: String,
+    /// Total potential, loads included.
+    pub energy: f64,
+    /// Elastic energy alone.
+    pub elastic_energy: f64,
+    /// The shape.
+    pub spine: Spine,
+    /// Torsion ω_η at every node.
+    pub torsion: Vec<f64>,
+    /// What the belt beyond every node does to the part before it; empty where the method knows no forces.
+    pub internal: Vec<Wrench>,
+    /// What each support does to the belt, in the order of the scenario; empty where the method knows no forces.
+    pub reactions: Vec<Reaction>,
+    /// Whether the equilibrium is a local minimum, where known.
+    pub stable: Option<bool>,
+    /// How far the shape is from a solution of its discrete equations, lengths in U and energy in mean R_f/U.
+    pub residuals: Residuals,
+    /// Iterations, over all attempts.
+    pub iterations: usize,
+}
+
+/// Units of length and energy of a programme in which lengths are in U and energy in mean R_f/U.
+#[derive(Debug, Clone, Copy)]
+struct Units {
+    length: f64,
+    energy: f64,
+}
+
+impl Units {
+    fn of(belt: &Belt) -> Self {
+        Self {
+            length: belt.length(),
+            energy: belt.mean_rigidity() / belt.length(),
+        }
+    }
+}
+
+/// Finds an equilibrium of a scenario that [`Scenario::validate`] passes.
+///
+/// `proceed` is asked once an iteration whether to go on; `Break` ends the solve as not converged.
+///
+/// Source: Sec. II-D, in the two fields bend and rib slope; Sec. III where the scenario asks for the source's method.
+///
+/// # Panics
+///
+/// If the scenario asks for what [`Scenario::validate`] refuses.
+pub fn solve(scenario: &Scenario, proceed: &mut dyn FnMut() -> ControlFlow<()>) -> Equilibrium {
+    let belt = Belt::new(&scenario.belt).expect("a validated scenario");
+    match scenario.solver.method {
+        Method::Intrinsic => intrinsic::solve(scenario, &belt, proceed),
+        Method::Ritz => ritz::solve(scenario, &belt, proceed),
+    }
+}

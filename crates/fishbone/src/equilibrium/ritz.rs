@@ -1,0 +1,113 @@
+//! The source's own method, in the terms of an equilibrium.
+
+use super::{Equilibrium, Status, Units};
+use crate::belt::Belt;
+use crate::lie::{Pose, exp, log};
+use crate::ritz::{self, Options, Orientation, Problem, Side, Solution};
+use crate::scenario::{Scenario, SupportSpec};
+use crate::solver::Residuals;
+use crate::spine::Spine;
+use nalgebra::Vector3;
+use std::ops::ControlFlow;
+
+/// Solves a belt clamped at both ends.
+///
+/// # Panics
+///
+/// If an end is not held in position and orientation.
+pub(super) fn solve(
+    scenario: &Scenario,
+    belt: &Belt,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Equilibrium {
+    let units = Units::of(belt);
+    let [start, end] = [0, 1].map(|i| held(&scenario.supports[i]));
+    let to_end = start.inverse() * end;
+    let problem = Problem {
+        width_over_length: belt.width / units.length,
+        end_position: to_end.position / units.length,
+        end_orientation: Orientation::as_in_source(&to_end.frame),
+        energy: scenario.energy,
+        bulge: side(&start, &to_end, &Vector3::from(scenario.solver.bulge)),
+    };
+    let spec = &scenario.solver.ritz;
+    let options = Options {
+        basis: spec.basis,
+        points: spec.points,
+        penalty: spec.penalty,
+        updates: spec.updates,
+    };
+    let solution = ritz::solve(&problem, &options, proceed);
+    report(scenario, belt, &start, &solution)
+}
+
+fn held(support: &SupportSpec) -> Pose {
+    Pose {
+        frame: support.frame().expect("a validated scenario"),
+        position: support.point().expect("a validated scenario"),
+    }
+}
+
+/// The side of the start frame on which the bulge lies, judged by the normal half way to the end.
+fn side(start: &Pose, to_end: &Pose, bulge: &Vector3<f64>) -> Side {
+    let middle = start.frame * exp(&(0.5 * log(&to_end.frame)));
+    if middle.column(0).dot(bulge) < 0.0 {
+        Side::Minus
+    } else {
+        Side::Plus
+    }
+}
+
+fn report(scenario: &Scenario, belt: &Belt, start: &Pose, solution: &Solution) -> Equilibrium {
+    let units = Units::of(belt);
+    let count = scenario.elements();
+    let u: Vec<f64> = (0..=count).map(|k| k as f64 / count as f64).collect();
+    let pose = |(u, position): (&f64, Vector3<f64>)| {
+        *start
+            * Pose {
+                frame: solution.frame(*u),
+                position: position * units.length,
+            }
+    };
+    let rate = |i: usize| u.iter().map(move |u| solution.rates(*u)[i] / units.length);
+    let energy = solution.energy * units.energy;
+    Equilibrium {
+        scenario: scenario.clone(),
+        status: Status::NotConverged,
+        message: message(solution),
+        energy,
+        elastic_energy: energy,
+        torsion: rate(1).collect(),
+        spine: Spine {
+            width: belt.width,
+            pose: u.iter().zip(solution.positions(&u)).map(pose).collect(),
+            bend: rate(2).collect(),
+            rib_slope: u.iter().map(|u| solution.rib_slope(*u)).collect(),
+            u: u.iter().map(|u| u * units.length).collect(),
+        },
+        internal: Vec::new(),
+        reactions: Vec::new(),
+        stable: None,
+        residuals: Residuals {
+            stationarity: solution.stationarity,
+            constraint: solution.violation_along.max(),
+            complementarity: 0.0,
+        },
+        iterations: solution.iterations,
+    }
+}
+
+fn message(solution: &Solution) -> String {
+    let (points, along) = (&solution.violation, &solution.violation_along);
+    let ended = if solution.interrupted {
+        "interrupted"
+    } else {
+        "ended"
+    };
+    format!(
+        "the source's equations are over-determined and cannot all be met: {ended} with Eq. (25) missed by {:.2e} and \
+         Eq. (32) by {:.2e} rad/U at the collocation points, by {:.2e} and {:.2e} between them; for an equilibrium use \
+         solver.method = \"intrinsic\"",
+        points.geodesic, points.rib_slope, along.geodesic, along.rib_slope
+    )
+}
