@@ -1,0 +1,57 @@
+//! From the core's vectors to NumPy arrays: float64, C order, one row a node.
+
+use nalgebra::{Matrix3, Vector3};
+use numpy::ndarray::{Array2, Array3};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3};
+use pyo3::exceptions::PyRuntimeError;
+use pyo3::prelude::*;
+
+pub(crate) type Scalars<'py> = Bound<'py, PyArray1<f64>>;
+pub(crate) type Points<'py> = Bound<'py, PyArray2<f64>>;
+pub(crate) type Triangles<'py> = Bound<'py, PyArray2<i64>>;
+pub(crate) type Grid<'py> = Bound<'py, PyArray3<f64>>;
+
+/// A vector as a row of numbers.
+pub(crate) fn row(vector: &Vector3<f64>) -> [f64; 3] {
+    [vector.x, vector.y, vector.z]
+}
+
+/// Shapes: (n, 3).
+pub(crate) fn points<'a, 'py>(
+    py: Python<'py>,
+    vectors: impl IntoIterator<Item = &'a Vector3<f64>>,
+) -> Points<'py> {
+    let rows: Vec<[f64; 3]> = vectors.into_iter().map(row).collect();
+    Array2::from(rows).into_pyarray(py)
+}
+
+/// Shapes: (n, 3, 3), row-major.
+pub(crate) fn frames<'a, 'py>(
+    py: Python<'py>,
+    frames: impl IntoIterator<Item = &'a Matrix3<f64>>,
+) -> Grid<'py> {
+    let rows: Vec<[[f64; 3]; 3]> = frames
+        .into_iter()
+        .map(|frame| frame.transpose().into())
+        .collect();
+    Array3::from(rows).into_pyarray(py)
+}
+
+/// Shapes: (n, `n_across`, 3).
+pub(crate) fn grid<'py>(
+    py: Python<'py>,
+    n_across: usize,
+    vectors: impl Iterator<Item = Vector3<f64>>,
+) -> PyResult<Grid<'py>> {
+    let flat: Vec<f64> = vectors.flat_map(|vector| row(&vector)).collect();
+    let shape = (flat.len() / (3 * n_across), n_across, 3);
+    let array = Array3::from_shape_vec(shape, flat)
+        .map_err(|error| PyRuntimeError::new_err(error.to_string()))?;
+    Ok(array.into_pyarray(py))
+}
+
+/// Shapes: (m, 3), indices of vertices.
+pub(crate) fn triangles<'py>(py: Python<'py>, corners: &[[u32; 3]]) -> Triangles<'py> {
+    let rows: Vec<[i64; 3]> = corners.iter().map(|corner| corner.map(i64::from)).collect();
+    Array2::from(rows).into_pyarray(py)
+}

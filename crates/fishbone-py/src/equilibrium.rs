@@ -1,0 +1,244 @@
+//! `_core.Equilibrium` and the solve that makes it.
+
+use crate::array::{self, Grid, Points, Scalars, Triangles};
+use crate::scenario::Scenario;
+use fishbone::equilibrium::{self, Status, Wrench};
+use fishbone::surface;
+use numpy::IntoPyArray;
+use pyo3::prelude::*;
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
+
+/// Short enough for Ctrl-C to feel immediate, long enough to cost nothing.
+const SIGNAL_INTERVAL: Duration = Duration::from_millis(50);
+
+/// Solves a scenario with the GIL released.
+///
+/// Errors: whatever a signal handler raises, `KeyboardInterrupt` first of all.
+#[pyfunction]
+pub(crate) fn solve(py: Python<'_>, scenario: &Scenario) -> PyResult<Equilibrium> {
+    let mut signals = Signals::new();
+    let start = Instant::now();
+    let solved = py.detach(|| equilibrium::solve(&scenario.0, &mut || signals.proceed()));
+    let solve_time = start.elapsed().as_secs_f64();
+    match signals.raised {
+        Some(error) => Err(error),
+        None => Ok(Equilibrium { solved, solve_time }),
+    }
+}
+
+/// Asks Python now and then whether a signal has arrived.
+struct Signals {
+    asked: Instant,
+    raised: Option<PyErr>,
+}
+
+impl Signals {
+    fn new() -> Self {
+        Self {
+            asked: Instant::now(),
+            raised: None,
+        }
+    }
+
+    fn proceed(&mut self) -> ControlFlow<()> {
+        if self.asked.elapsed() < SIGNAL_INTERVAL {
+            return ControlFlow::Continue(());
+        }
+        self.asked = Instant::now();
+        self.raised = Python::attach(|py| py.check_signals()).err();
+        match self.raised {
+            Some(_) => ControlFlow::Break(()),
+            None => ControlFlow::Continue(()),
+        }
+    }
+}
+
+/// The outcome of a solve.
+#[pyclass(frozen, module = "fishbone._core")]
+pub(crate) struct Equilibrium {
+    solved: equilibrium::Equilibrium,
+    solve_time: f64,
+}
+
+#[pymethods]
+impl Equilibrium {
+    #[getter]
+    fn status(&self) -> &'static str {
+        match self.solved.status {
+            Status::Converged => "converged",
+            Status::Infeasible => "infeasible",
+            Status::NotConverged => "not_converged",
+        }
+    }
+
+    #[getter]
+    fn message(&self) -> &str {
+        &self.solved.message
+    }
+
+    #[getter]
+    fn energy(&self) -> f64 {
+        self.solved.energy
+    }
+
+    #[getter]
+    fn elastic_energy(&self) -> f64 {
+        self.solved.elastic_energy
+    }
+
+    #[getter]
+    fn stable(&self) -> Option<bool> {
+        self.solved.stable
+    }
+
+    #[getter]
+    fn iterations(&self) -> usize {
+        self.solved.iterations
+    }
+
+    #[getter]
+    fn solve_time(&self) -> f64 {
+        self.solve_time
+    }
+
+    /// (stationarity, constraint, complementarity).
+    #[getter]
+    fn residuals(&self) -> (f64, f64, f64) {
+        let residuals = &self.solved.residuals;
+        (
+            residuals.stationarity,
+            residuals.constraint,
+            residuals.complementarity,
+        )
+    }
+
+    /// Shapes: (n,).
+    #[getter]
+    fn u<'py>(&self, py: Python<'py>) -> Scalars<'py> {
+        self.solved.spine.u.clone().into_pyarray(py)
+    }
+
+    /// Shapes: (n, 3).
+    #[getter]
+    fn position<'py>(&self, py: Python<'py>) -> Points<'py> {
+        array::points(py, self.solved.spine.pose.iter().map(|pose| &pose.position))
+    }
+
+    /// Shapes: (n, 3, 3).
+    #[getter]
+    fn frame<'py>(&self, py: Python<'py>) -> Grid<'py> {
+        array::frames(py, self.solved.spine.pose.iter().map(|pose| &pose.frame))
+    }
+
+    /// Shapes: (n,).
+    #[getter]
+    fn bend<'py>(&self, py: Python<'py>) -> Scalars<'py> {
+        self.solved.spine.bend.clone().into_pyarray(py)
+    }
+
+    /// Shapes: (n,).
+    #[getter]
+    fn rib_slope<'py>(&self, py: Python<'py>) -> Scalars<'py> {
+        self.solved.spine.rib_slope.clone().into_pyarray(py)
+    }
+
+    /// Shapes: (n,).
+    #[getter]
+    fn torsion<'py>(&self, py: Python<'py>) -> Scalars<'py> {
+        self.solved.torsion.clone().into_pyarray(py)
+    }
+
+    /// Shapes: (n,).
+    #[getter]
+    fn rib_angle<'py>(&self, py: Python<'py>) -> Scalars<'py> {
+        self.solved.spine.rib_angle().into_pyarray(py)
+    }
+
+    /// Shapes: (n,).
+    #[getter]
+    fn curvature<'py>(&self, py: Python<'py>) -> Scalars<'py> {
+        self.solved.spine.curvature().into_pyarray(py)
+    }
+
+    /// Shapes: (n, 3).
+    #[getter]
+    fn internal_force<'py>(&self, py: Python<'py>) -> Points<'py> {
+        array::points(py, self.solved.internal.iter().map(|on| &on.force))
+    }
+
+    /// Shapes: (n, 3).
+    #[getter]
+    fn internal_moment<'py>(&self, py: Python<'py>) -> Points<'py> {
+        array::points(py, self.solved.internal.iter().map(|on| &on.moment))
+    }
+
+    /// (minus, plus), the ribs' ends on the −ζ and the +ζ side.
+    ///
+    /// Shapes: (n, 3) each.
+    #[getter]
+    fn edges<'py>(&self, py: Python<'py>) -> (Points<'py>, Points<'py>) {
+        let edges = surface::edges(&self.solved.spine);
+        (
+            array::points(py, &edges.minus),
+            array::points(py, &edges.plus),
+        )
+    }
+
+    /// (at, force, moment) of every support, in the order of the scenario.
+    #[getter]
+    fn reactions(&self) -> Vec<(f64, [f64; 3], [f64; 3])> {
+        let reactions = self.solved.reactions.iter();
+        reactions
+            .map(|on| {
+                let Wrench { force, moment } = &on.wrench;
+                (on.at, array::row(force), array::row(moment))
+            })
+            .collect()
+    }
+
+    /// (u, position).
+    #[getter]
+    fn highest_point(&self) -> (f64, [f64; 3]) {
+        let highest = self.solved.highest_point();
+        (highest.u, array::row(&highest.position))
+    }
+
+    /// (value, u, v), or None where the belt does not bend.
+    #[getter]
+    fn least_bend_radius(&self) -> Option<(f64, f64, f64)> {
+        let least = surface::least_bend_radius(&self.solved.spine)?;
+        Some((least.value, least.u, least.v))
+    }
+
+    /// (value, u).
+    #[getter]
+    fn rib_margin(&self) -> (f64, f64) {
+        let margin = surface::rib_margin(&self.solved.spine);
+        (margin.value, margin.u)
+    }
+
+    /// Points of the surface.
+    ///
+    /// Shapes: (n, `n_across`, 3).
+    fn surface<'py>(&self, py: Python<'py>, n_across: usize) -> PyResult<Grid<'py>> {
+        let points = surface::points(&self.solved.spine, n_across);
+        array::grid(py, n_across, points.into_iter().flatten())
+    }
+
+    /// (vertices, triangles).
+    ///
+    /// Shapes: (p, 3), (m, 3).
+    fn mesh<'py>(&self, py: Python<'py>, n_across: usize) -> (Points<'py>, Triangles<'py>) {
+        let mesh = surface::mesh(&self.solved.spine, n_across);
+        (
+            array::points(py, &mesh.vertices),
+            array::triangles(py, &mesh.triangles),
+        )
+    }
+
+    /// The result schema as JSON, without `solve_time`.
+    fn to_json(&self) -> String {
+        self.solved.to_json()
+    }
+}

@@ -1,0 +1,18 @@
+//! Python bindings: convert, release the GIL, call.
+
+mod array;
+mod equilibrium;
+mod scenario;
+
+/// The compiled core of fishbone; `fishbone` itself is its public face.
+#[pyo3::pymodule]
+mod _core {
+    #[pymodule_export]
+    use crate::equilibrium::{Equilibrium, solve};
+    #[pymodule_export]
+    use crate::scenario::Scenario;
+
+    #[pymodule_export]
+    #[expect(non_upper_case_globals, reason = "the name Python expects")]
+    const __version__: &str = env!("CARGO_PKG_VERSION");
+}

@@ -1,0 +1,311 @@
+"""Equilibria: what a solve ends with."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+import numpy as np
+
+from fishbone import _core
+from fishbone.errors import InvalidArgument, NoSupport, NotConverged
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from fishbone.scenario import Scenario
+
+    Floats = NDArray[np.float64]
+
+MIN_ACROSS, MAX_ACROSS = 2, 10_001
+"""Ribs are straight: two points hold all there is to a rib, and more are for rendering."""
+
+Status = Literal["converged", "infeasible", "not_converged"]
+
+
+class Reaction(NamedTuple):
+    """What a support does to the belt, world axes.
+
+    Shapes: (3,) each.
+    Units: force [N], moment about the support point [N·m], in the scenario's own units.
+    """
+
+    force: Floats
+    moment: Floats
+
+
+class Internal(NamedTuple):
+    """What the belt beyond u does to the part before it, world axes, the moment about the spine point.
+
+    Shapes: (n, 3) each.
+    """
+
+    force: Floats
+    moment: Floats
+
+
+class Edges(NamedTuple):
+    """The ribs' ends on the −ζ and on the +ζ side.
+
+    Shapes: (n, 3) each.
+    """
+
+    minus: Floats
+    plus: Floats
+
+
+class Residuals(NamedTuple):
+    """Max-norms of what an exact solution has at 0, with lengths in U and energy in mean R_f/U."""
+
+    stationarity: float
+    constraint: float
+    complementarity: float
+
+
+class HighestPoint(NamedTuple):
+    """The point of the spine farthest along the scenario's `bulge`; position has shape (3,)."""
+
+    u: float
+    position: Floats
+
+
+class BendRadius(NamedTuple):
+    """The least radius of bend over the whole width, and where it is: u along the spine, v across."""
+
+    value: float
+    u: float
+    v: float
+
+
+class RibMargin(NamedTuple):
+    """How far the ribs are from crossing at an edge, least over u, and where."""
+
+    value: float
+    u: float
+
+
+class Equilibrium:
+    """The shape of a belt and all that is reported of it.
+
+    A solve that fails ends with one too: look at `status` before anything else. n is the number of nodes; a node
+    at a corner of the board comes twice, before and after it. Arrays are float64 in C order, and the caller's own.
+
+    Units: those of the scenario; angles in rad.
+    """
+
+    __slots__ = ("_inner", "scenario")
+
+    def __init__(self, scenario: Scenario, inner: _core.Equilibrium) -> None:
+        self.scenario = scenario
+        self._inner = inner
+
+    @property
+    def status(self) -> Status:
+        """How the solve ended: "converged", "infeasible" or "not_converged"."""
+        return self._inner.status
+
+    @property
+    def message(self) -> str:
+        """One line: why the solve ended so, and what to try."""
+        return self._inner.message
+
+    @property
+    def energy(self) -> float:
+        """Total potential, loads included."""
+        return self._inner.energy
+
+    @property
+    def elastic_energy(self) -> float:
+        """Energy of bending alone."""
+        return self._inner.elastic_energy
+
+    @property
+    def energy_model(self) -> str:
+        """The energy minimised: "fishbone", "sadowsky" or "wunderlich"."""
+        return str(self.to_dict()["energy_model"])
+
+    @property
+    def stable(self) -> bool | None:
+        """Whether the equilibrium is a local minimum; None where that is not known."""
+        return self._inner.stable
+
+    @property
+    def iterations(self) -> int:
+        """Newton iterations of the solve."""
+        return self._inner.iterations
+
+    @property
+    def solve_time(self) -> float:
+        """Wall time of the solve [s]."""
+        return self._inner.solve_time
+
+    @property
+    def residuals(self) -> Residuals:
+        """How far the result is from an exact solution of its discrete equations."""
+        return Residuals(*self._inner.residuals)
+
+    @property
+    def u(self) -> Floats:
+        """Arc length of the nodes along the spine.
+
+        Shapes: (n,).
+        """
+        return self._inner.u
+
+    @property
+    def position(self) -> Floats:
+        """Spine position x(u).
+
+        Shapes: (n, 3).
+        """
+        return self._inner.position
+
+    @property
+    def frame(self) -> Floats:
+        """Frame R(u), whose columns are ξ (normal), η (tangent) and ζ (width direction).
+
+        Shapes: (n, 3, 3).
+        Source: Eq. (1), (2).
+        """
+        return self._inner.frame
+
+    @property
+    def bend(self) -> Floats:
+        """Bend ω_ζ.
+
+        Shapes: (n,).
+        Source: Eq. (4).
+        """
+        return self._inner.bend
+
+    @property
+    def torsion(self) -> Floats:
+        """Torsion ω_η.
+
+        Shapes: (n,).
+        Source: Eq. (4).
+        """
+        return self._inner.torsion
+
+    @property
+    def rib_slope(self) -> Floats:
+        """Rib slope β = tan α.
+
+        Shapes: (n,).
+        Source: Eq. (31).
+        """
+        return self._inner.rib_slope
+
+    @property
+    def rib_angle(self) -> Floats:
+        """Rib angle α [rad].
+
+        Shapes: (n,).
+        Source: Eq. (30).
+        """
+        return self._inner.rib_angle
+
+    @property
+    def curvature(self) -> Floats:
+        """Principal curvature κ₁, the one that is not zero.
+
+        Shapes: (n,).
+        Source: Eq. (29).
+        """
+        return self._inner.curvature
+
+    @property
+    def internal(self) -> Internal:
+        """Internal force and moment at the nodes."""
+        return Internal(self._inner.internal_force, self._inner.internal_moment)
+
+    @property
+    def edges(self) -> Edges:
+        """The two edges of the belt, as the ribs' ends."""
+        return Edges(*self._inner.edges)
+
+    @property
+    def highest_point(self) -> HighestPoint:
+        """The highest point of the spine."""
+        u, position = self._inner.highest_point
+        return HighestPoint(u, np.array(position))
+
+    @property
+    def least_bend_radius(self) -> BendRadius | None:
+        """The tightest bend of the whole belt, often at an edge; None where nothing bends."""
+        least = self._inner.least_bend_radius
+        return None if least is None else BendRadius(*least)
+
+    @property
+    def rib_margin(self) -> RibMargin:
+        """How far the ribs are from crossing inside the belt.
+
+        Source: Eq. (33).
+        """
+        return RibMargin(*self._inner.rib_margin)
+
+    def reaction(self, support: Literal["start", "end"] | int) -> Reaction:
+        """What a support does to the belt: the one at the start, at the end, or by its index in the scenario.
+
+        Errors: `NoSupport`.
+        """
+        reactions = self._inner.reactions
+        try:
+            _, force, moment = reactions[self._support_index(support)]
+        except IndexError:
+            raise NoSupport(f"support {support!r}: found {len(reactions)} supports") from None
+        return Reaction(np.array(force), np.array(moment))
+
+    def _support_index(self, support: Literal["start", "end"] | int) -> int:
+        if not isinstance(support, str):
+            return support
+        ends = {"start": 0.0, "end": float(self.u[-1])}
+        places = [at for at, _, _ in self._inner.reactions]
+        for index, at in enumerate(places):
+            if support in ends and math.isclose(at, ends[support], abs_tol=1e-9 * ends["end"]):
+                return index
+        raise NoSupport(f'support {support!r}: found supports at u = {places}, allowed "start", "end" or an index')
+
+    def surface(self, n_across: int = 9) -> Floats:
+        """Points of the surface, on every rib from the −ζ edge to the +ζ edge.
+
+        Shapes: (n, n_across, 3).
+        Errors: `InvalidArgument` where n_across is below 2.
+        """
+        return self._inner.surface(_across(n_across))
+
+    def mesh(self, n_across: int = 9) -> tuple[Floats, NDArray[np.int64]]:
+        """Vertices and triangles of the surface.
+
+        Shapes: (p, 3) and (m, 3).
+        Errors: `InvalidArgument` where n_across is below 2.
+        """
+        return self._inner.mesh(_across(n_across))
+
+    def to_dict(self) -> dict[str, Any]:
+        """The result as plain numbers, lists and text, schema "fishbone.result/1"."""
+        result: dict[str, Any] = json.loads(self._inner.to_json())
+        return result | {"solve_time": self.solve_time}
+
+    def __repr__(self) -> str:
+        return f"<Equilibrium: {self.status}, energy {self.energy:.5g}, {self.iterations} iterations>"
+
+
+def solve(scenario: Scenario, *, strict: bool = False) -> Equilibrium:
+    """Finds the equilibrium of a scenario; a failure is a value too, see `Equilibrium.status`.
+
+    Other threads run meanwhile, and Ctrl-C ends the solve.
+
+    Errors: `NotConverged`, which carries the equilibrium, where `strict` is asked for.
+    """
+    equilibrium = Equilibrium(scenario, _core.solve(scenario._inner))  # noqa: SLF001 - the same package
+    if strict and equilibrium.status != "converged":
+        raise NotConverged(equilibrium)
+    return equilibrium
+
+
+def _across(n_across: int) -> int:
+    if not MIN_ACROSS <= n_across <= MAX_ACROSS:
+        raise InvalidArgument(f"n_across: found {n_across}, allowed {MIN_ACROSS} to {MAX_ACROSS}")
+    return n_across

@@ -1,0 +1,38 @@
+"""Files written whole or not at all."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def check_writable(path: Path, suffixes: tuple[str, ...]) -> str | None:
+    """What stands in the way of writing a file here, "found …, allowed …"; None where nothing does."""
+    folder = path.parent
+    if path.suffix.lower() not in suffixes:
+        return f"found {path.suffix or 'no suffix'}, allowed {', '.join(suffixes)}"
+    if not folder.is_dir():
+        return f"found no folder {folder}, allowed an existing one"
+    if path.is_dir():
+        return f"found the folder {path}, allowed a file"
+    if not os.access(folder, os.W_OK | os.X_OK):
+        return f"found the folder {folder} read-only, allowed one to write in"
+    return None
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Writes a file beside its place and moves it there, so that no reader ever sees a part of it.
+
+    Errors: `OSError`; the file is then as it was before.
+    """
+    # A link stays a link: what it points to is what is replaced.
+    target = path.resolve()
+    draft = target.with_name(f".{target.name}.{os.getpid()}.part")
+    try:
+        draft.write_bytes(content)
+        draft.replace(target)
+    finally:
+        draft.unlink(missing_ok=True)

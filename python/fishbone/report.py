@@ -1,0 +1,111 @@
+"""The table for people."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from rich import box
+from rich.console import Group
+from rich.table import Table
+from rich.text import Text
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from fishbone.equilibrium import Equilibrium, Floats
+
+DIGITS = 5
+"""Significant digits: what a default mesh supports, about."""
+
+
+def report(equilibrium: Equilibrium) -> Group:
+    """All that the command line tells of an equilibrium, as rich tables."""
+    tables = equilibrium.scenario.to_dict()
+    title = f"{tables.get('name') or 'belt'}: {equilibrium.energy_model} energy, {equilibrium.status}"
+    return Group(Text(title, style="bold"), _scalars(equilibrium), _vectors(equilibrium))
+
+
+def number(value: float) -> str:
+    """A number with five significant digits.
+
+    >>> number(23.504123), number(0.0), number(1.25e-7)
+    ('23.504', '0', '1.25e-07')
+    """
+    return f"{value + 0.0:.{DIGITS}g}"
+
+
+def row(vector: Floats) -> list[str]:
+    """The components of a vector with equal decimals, five significant digits in the largest.
+
+    >>> row(np.array([12.3456, -0.0000004, 1.0]))
+    ['12.346', '0.000', '1.000']
+    """
+    largest = float(np.max(np.abs(vector)))
+    decimals = DIGITS - 1 - math.floor(math.log10(largest)) if largest > 0.0 else DIGITS - 1
+    if not 0 <= decimals <= 2 * DIGITS:
+        return [f"{component:.{DIGITS - 1}e}" for component in vector]
+    # Adding 0.0 turns a rounded −0 into 0.
+    return [f"{round(component, decimals) + 0.0:.{decimals}f}" for component in vector.tolist()]
+
+
+def _scalars(equilibrium: Equilibrium) -> Table:
+    table = Table(box=None, show_header=False, pad_edge=False)
+    table.add_column()
+    table.add_column(justify="right")
+    table.add_column()
+    for quantity, value, where in _quantities(equilibrium):
+        table.add_row(quantity, value, where)
+    return table
+
+
+def _quantities(equilibrium: Equilibrium) -> Iterator[tuple[str, str, str]]:
+    yield "energy", number(equilibrium.energy), ""
+    if equilibrium.elastic_energy != equilibrium.energy:
+        yield "elastic energy", number(equilibrium.elastic_energy), ""
+    yield from _extremes(equilibrium)
+    yield "local minimum", {True: "yes", False: "no", None: "not known"}[equilibrium.stable], ""
+    for name, residual in equilibrium.residuals._asdict().items():
+        yield f"residual, {name}", f"{residual:.1e}", ""
+    yield "iterations", str(equilibrium.iterations), ""
+    yield "time", f"{equilibrium.solve_time:.3g}", "s"
+
+
+def _extremes(equilibrium: Equilibrium) -> Iterator[tuple[str, str, str]]:
+    least = equilibrium.least_bend_radius
+    if least is not None:
+        yield "least bend radius", number(least.value), f"at u = {number(least.u)}, v = {number(least.v)}"
+    angle = np.degrees(equilibrium.rib_angle)
+    largest = int(np.argmax(np.abs(angle)))
+    yield "largest rib angle", number(abs(angle[largest])), f"degrees, at u = {number(equilibrium.u[largest])}"
+
+
+def _vectors(equilibrium: Equilibrium) -> Table:
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    table.add_column("world axes")
+    for axis in "xyz":
+        table.add_column(axis, justify="right")
+    for name, vector in _named_vectors(equilibrium):
+        table.add_row(name, *row(vector))
+    return table
+
+
+def _named_vectors(equilibrium: Equilibrium) -> Iterable[tuple[str, Floats]]:
+    u, position = equilibrium.highest_point
+    yield f"highest point, u = {number(u)}", position
+    for index, support in enumerate(equilibrium.to_dict()["supports"]):
+        place = _place(support["at"], equilibrium.u)
+        force, moment = equilibrium.reaction(index)
+        yield f"force on the belt, {place}", force
+        yield f"moment on the belt, {place}", moment
+
+
+def _place(at: float | str, u: Floats) -> str:
+    if isinstance(at, str):
+        return at
+    ends = {"start": u[0], "end": u[-1]}
+    for name, end in ends.items():
+        if math.isclose(at, end, abs_tol=1e-9 * u[-1]):
+            return name
+    return f"u = {number(at)}"
