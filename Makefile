@@ -1,0 +1,74 @@
+# make demo    solves example 1: the table here, out/example1.json and out/example1.png
+# make test    everything that must hold
+# make clean   removes what these two made
+#
+# Needs cargo, Python 3.10 or newer and make; everything else goes into .venv.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python -m pip --quiet --disable-pip-version-check
+CORE := python/fishbone/_core.abi3.so
+
+NEED_CARGO := @command -v cargo >/dev/null || { echo "fishbone needs cargo, which comes with Rust: https://rustup.rs" >&2; exit 1; }
+
+# What each step depends on, so that a second run does only what has changed.
+RUST_SOURCES := Cargo.toml Cargo.lock $(shell find crates scenarios -type f)
+PYTHON_SOURCES := pyproject.toml $(shell find python tests -name '*.py' -o -name '*.pyi')
+TEXTS := $(shell find README.md docs scenarios tests -type f -not -name '*.pyc' 2>/dev/null)
+
+.PHONY: help demo test clean
+.DELETE_ON_ERROR:
+
+help:
+	@sed -n 's/^# \(make .*\)/\1/p' Makefile
+
+demo: $(CORE)
+	@mkdir -p out
+	@$(BIN)/fishbone solve scenarios/example1.toml --out out/example1.json --figure out/example1.png
+	@echo "out/example1.json and out/example1.png written"
+
+test: $(VENV)/.rust $(VENV)/.lint $(VENV)/.pytest
+	@echo "all tests pass"
+
+clean:
+	@rm -rf $(VENV) out dist $(CORE)
+	@cargo clean --quiet
+
+$(VENV)/.packages: requirements-dev.txt
+	$(NEED_CARGO)
+	@command -v $(PYTHON) >/dev/null || { echo "fishbone needs Python 3.10 or newer; name yours with: make PYTHON=python3.12" >&2; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10))' || { echo "fishbone needs Python 3.10 or newer, found $$($(PYTHON) --version); name another with: make PYTHON=python3.12" >&2; exit 1; }
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { echo "fishbone needs Python's venv module; on Debian and Ubuntu: apt install python3-venv" >&2; exit 1; }
+	@echo "installing Python packages into $(VENV)"
+	@$(PYTHON) -m venv --clear $(VENV)
+	@$(PIP) install --requirement requirements-dev.txt
+	@touch $@
+
+$(CORE): $(VENV)/.packages $(RUST_SOURCES) pyproject.toml
+	$(NEED_CARGO)
+	@echo "building the Rust core (about a minute the first time)"
+	@$(PIP) install --no-deps --no-build-isolation --editable .
+	@touch $@
+
+$(VENV)/.rust: $(VENV)/.packages $(RUST_SOURCES)
+	$(NEED_CARGO)
+	@echo "checking the Rust code"
+	@cargo fmt --all --check
+	@cargo clippy --quiet --locked --workspace --all-targets -- --deny warnings
+	@echo "testing the Rust code"
+	@cargo test --quiet --locked --workspace
+	@touch $@
+
+$(VENV)/.lint: $(CORE) $(PYTHON_SOURCES)
+	@echo "checking the Python code"
+	@$(BIN)/ruff check --quiet .
+	@$(BIN)/ruff format --quiet --check .
+	@$(BIN)/python -m mypy --no-error-summary
+	@$(BIN)/python -m mypy.stubtest --concise fishbone._core
+	@touch $@
+
+$(VENV)/.pytest: $(CORE) $(PYTHON_SOURCES) $(TEXTS)
+	@echo "testing the Python code"
+	@$(BIN)/python -m pytest --quiet
+	@touch $@

@@ -1,0 +1,523 @@
+"""Bad input gets one line that helps, the right exit code, and leaves nothing behind.
+
+CONTRACT: exit 2 for invalid input (one line: file, field, what was found, what is allowed), 3 for infeasible or not
+converged (one line: why); exit 3 still writes `--out` and no picture. Never a traceback. In Python: `InvalidScenario`
+before any
+solve; a solve that fails is a value.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import fishbone as fb
+from helpers import Json, clamped, example1, solve_any
+
+HUGE_FILE = 100_000_000
+HUGE_FILE_SECONDS = 5.0
+HUGE_FILE_MEMORY = 30_000_000
+
+Change = Callable[[Json], None]
+
+
+@dataclass(frozen=True)
+class Case:
+    """One thing wrong in an otherwise good scenario, and the words its message must hold (letter case aside)."""
+
+    name: str
+    change: Change
+    words: tuple[str, ...]
+
+
+def good() -> Json:
+    return example1("wunderlich", elements=80)
+
+
+def put(path: str, value: Any) -> Change:
+    """Sets a field; numbers in the path are list indices."""
+
+    def change(scenario: Json) -> None:
+        *parents, last = [int(key) if key.isdigit() else key for key in path.split(".")]
+        table: Any = scenario
+        for key in parents:
+            table = table.setdefault(key, {}) if isinstance(table, dict) else table[key]
+        table[last] = value
+
+    return change
+
+
+def rename(path: str, new: str) -> Change:
+    """Misspells a key."""
+
+    def change(scenario: Json) -> None:
+        *parents, last = [int(key) if key.isdigit() else key for key in path.split(".")]
+        table: Any = scenario
+        for key in parents:
+            table = table[key]
+        table[new] = table.pop(last)
+
+    return change
+
+
+def drop(path: str) -> Change:
+    """Leaves a field out."""
+
+    def change(scenario: Json) -> None:
+        *parents, last = [int(key) if key.isdigit() else key for key in path.split(".")]
+        table: Any = scenario
+        for key in parents:
+            table = table[key]
+        del table[last]
+
+    return change
+
+
+def both(*changes: Change) -> Change:
+    def change(scenario: Json) -> None:
+        for one in changes:
+            one(scenario)
+
+    return change
+
+
+def reverse_supports(scenario: Json) -> None:
+    scenario["supports"].reverse()
+
+
+MATERIAL = {"young": 3.2e9, "poisson": 0.34, "thickness": 140e-6}
+STRAIGHT = {"kind": "straight", "length": 0.5}
+NAN, INF = math.nan, math.inf
+
+UNKNOWN_KEYS = (
+    Case("unknown key", put("colour", "red"), ("colour",)),
+    Case("misspelt energy", rename("energy", "enrgy"), ("enrgy", "energy")),
+    Case("misspelt belt", rename("belt", "bellt"), ("bellt", "belt")),
+    Case("misspelt width", rename("belt.width", "widht"), ("widht", "width")),
+    Case("misspelt rigidity", rename("belt.rigidity", "rigidty"), ("rigidty", "rigidity")),
+    Case("misspelt length", rename("belt.segments.0.length", "lenght"), ("lenght", "length")),
+    Case("misspelt position", rename("supports.1.position", "positon"), ("positon", "position")),
+    Case("misspelt rotation", rename("supports.1.rotation", "rotaton"), ("rotaton", "rotation")),
+    Case("misspelt elements", rename("solver.elements", "elments"), ("elments", "elements")),
+)
+
+WRONG_TYPES = (
+    Case("width a string", put("belt.width", "wide"), ("width",)),
+    Case("width a list", put("belt.width", [0.1]), ("width",)),
+    Case("energy a number", put("energy", 3), ("energy",)),
+    Case("belt a list", put("belt", [1.0]), ("belt",)),
+    Case("supports a table", put("supports", {"at": "start"}), ("supports",)),
+    Case("supports of numbers", put("supports", [1.0, 2.0]), ("supports",)),
+    Case("position of two", put("supports.1.position", [0.0, 0.5]), ("position",)),
+    Case("position of four", put("supports.1.position", [0.0, 0.5, 0.1, 0.0]), ("position",)),
+    Case("position of strings", put("supports.1.position", ["a", "b", "c"]), ("position",)),
+    Case("rotation a number", put("supports.1.rotation", 0.5), ("rotation",)),
+    Case("square_rib a string", put("supports.1.square_rib", "yes"), ("square_rib",)),
+    Case("elements a fraction", put("solver.elements", 80.5), ("elements",)),
+    Case("elements a string", put("solver.elements", "80"), ("elements",)),
+    Case("bulge of two", put("solver.bulge", [1.0, 0.0]), ("bulge",)),
+)
+
+MISSING = (
+    Case("no belt", drop("belt"), ("belt",)),
+    Case("no width", drop("belt.width"), ("width",)),
+    Case("no segments", drop("belt.segments"), ("segments",)),
+    Case("empty segments", put("belt.segments", []), ("segments",)),
+    Case("no length", drop("belt.segments.0.length"), ("length",)),
+    Case("no kind", drop("belt.segments.0.kind"), ("kind",)),
+    Case("no at", drop("supports.1.at"), ("at",)),
+    Case("no rigidity", drop("belt.rigidity"), ("rigidity",)),
+    Case("two rigidities", put("belt.material", MATERIAL), ("rigidity", "material")),
+)
+
+NUMBERS = (
+    *(
+        Case(f"{field} {value}", put(path, value), (field, str(value)))
+        for field, path in (
+            ("width", "belt.width"),
+            ("rigidity", "belt.rigidity"),
+            ("length", "belt.segments.0.length"),
+        )
+        for value in (NAN, INF, -INF, -0.25)
+    ),
+    Case("width 0", put("belt.width", 0.0), ("width", "0")),
+    Case("rigidity 0", put("belt.rigidity", 0.0), ("rigidity", "0")),
+    Case("length 0", put("belt.segments.0.length", 0.0), ("length", "0")),
+    Case("position nan", put("supports.1.position", [0.0, NAN, 0.1]), ("position", "nan")),
+    Case("position inf", put("supports.1.position", [0.0, 0.5, INF]), ("position", "inf")),
+    Case("rotation nan", put("supports.1.rotation", [0.0, NAN, 0.0]), ("rotation", "nan")),
+    Case("rotation inf", put("supports.1.rotation", [0.0, INF, 0.0]), ("rotation", "inf")),
+    Case("bulge nan", put("solver.bulge", [NAN, 0.0, 0.0]), ("bulge", "nan")),
+    Case("bulge 0", put("solver.bulge", [0.0, 0.0, 0.0]), ("bulge",)),
+    Case("tolerance nan", put("solver.tolerance", NAN), ("tolerance", "nan")),
+    Case("tolerance 0", put("solver.tolerance", 0.0), ("tolerance", "0")),
+    Case("3 elements", put("solver.elements", 3), ("elements", "3", "4")),
+    Case("100001 elements", put("solver.elements", 100_001), ("elements", "100001", "100000")),
+    Case("0 elements", put("solver.elements", 0), ("elements", "0")),
+    Case("-80 elements", put("solver.elements", -80), ("elements", "-80")),
+)
+
+
+def quaternion(values: list[float]) -> Change:
+    return both(drop("supports.1.rotation"), put("supports.1.quaternion", values))
+
+
+ORIENTATIONS = (
+    Case("quaternion too long", quaternion([1.0, 0.01, 0.0, 0.0]), ("quaternion",)),
+    Case("quaternion 3e-6 too long", quaternion([1.000003, 0.0, 0.0, 0.0]), ("quaternion",)),
+    Case("quaternion 3e-6 too short", quaternion([0.0, 0.999997, 0.0, 0.0]), ("quaternion",)),
+    Case("quaternion 0", quaternion([0.0, 0.0, 0.0, 0.0]), ("quaternion",)),
+    Case("quaternion nan", quaternion([NAN, 0.0, 0.0, 0.0]), ("quaternion", "nan")),
+    Case("quaternion of three", quaternion([1.0, 0.0, 0.0]), ("quaternion",)),
+    Case(
+        "two orientations",
+        put("supports.1.euler", [0.1, 0.2, 0.3]),
+        ("rotation", "euler"),
+    ),
+)
+
+CHOICES = (
+    Case("unknown energy", put("energy", "sadovsky"), ("energy", "sadovsky", "sadowsky")),
+    Case("unknown kind", put("belt.segments.0.kind", "strait"), ("strait", "straight")),
+    Case("unknown at", put("supports.1.at", "middle"), ("at", "middle", "start", "end")),
+    Case("unknown method", put("solver.method", "guess"), ("method", "guess", "intrinsic")),
+)
+
+SUPPORTS = (
+    Case("supports out of order", reverse_supports, ("supports",)),
+    Case("two supports at the start", put("supports.1.at", "start"), ("supports", "start")),
+    Case("support beyond the end", put("supports.1.at", 1.5), ("at", "1.5")),
+    Case("support before the start", put("supports.0.at", -0.1), ("at", "-0.1")),
+    Case("support at nan", put("supports.1.at", NAN), ("at", "nan")),
+)
+
+
+def inner_support(scenario: Json) -> None:
+    scenario["supports"].insert(1, {"at": 0.5, "position": [0.3, 0.25, 0.05]})
+
+
+NOT_YET = (
+    Case(
+        "arc",
+        put("belt.segments", [STRAIGHT, {"kind": "arc", "length": 0.5, "curvature": 1.4}]),
+        ("not yet", "arc"),
+    ),
+    Case(
+        "corner",
+        put("belt.segments", [STRAIGHT, {"kind": "corner", "angle": 1.0}, STRAIGHT]),
+        ("not yet", "corner"),
+    ),
+    Case(
+        "rigid",
+        put("belt.segments", [STRAIGHT, {"kind": "rigid", "length": 0.1}, STRAIGHT]),
+        ("not yet", "rigid"),
+    ),
+    Case("gravity", put("loads", {"gravity": [0.0, 0.0, -9.81]}), ("not yet", "loads")),
+    Case(
+        "point load",
+        put("loads", {"points": [{"at": 0.5, "force": [0.0, 0.0, -1.0]}]}),
+        ("not yet", "loads"),
+    ),
+    Case(
+        "link",
+        put("links", [{"from": 0.2, "to": 0.8, "offset": [0.0, 0.3, 0.0]}]),
+        ("not yet", "links"),
+    ),
+    Case("inner support", inner_support, ("not yet", "supports")),
+    Case("closed", both(put("belt.closed", True), put("belt.half_turns", 1)), ("not yet", "closed")),
+    Case("hinge", put("supports.1.hinge", "zeta"), ("not yet", "hinge")),
+    Case("natural bend", put("belt.natural_bend", 0.5), ("not yet", "natural_bend")),
+    Case(
+        "natural bend of a segment",
+        put("belt.segments.0.natural_bend", 0.5),
+        ("not yet", "natural_bend"),
+    ),
+)
+
+CASES = (
+    *UNKNOWN_KEYS,
+    *WRONG_TYPES,
+    *MISSING,
+    *NUMBERS,
+    *ORIENTATIONS,
+    *CHOICES,
+    *SUPPORTS,
+    *NOT_YET,
+)
+cases = pytest.mark.parametrize("case", CASES, ids=[case.name for case in CASES])
+
+
+# ------------------------------------------------------------------------------------------------ machinery
+
+
+def inline(value: Any) -> str:
+    """A TOML value on one line."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {inline(item)}" for key, item in value.items()) + " }"
+    if isinstance(value, list):
+        return "[" + ", ".join(inline(item) for item in value) + "]"
+    if isinstance(value, str):
+        return json.dumps(value)
+    return repr(value)
+
+
+def toml(scenario: Json) -> str:
+    return "".join(f"{key} = {inline(value)}\n" for key, value in scenario.items())
+
+
+def changed(case: Case) -> Json:
+    scenario = good()
+    case.change(scenario)
+    return scenario
+
+
+def command(path: Path) -> list[str]:
+    outputs = ["--out", "result.json", "--figure", "views.png"]
+    return [sys.executable, "-m", "fishbone", "solve", str(path), *outputs]
+
+
+def solve_file(path: Path) -> subprocess.CompletedProcess[str]:
+    """The command line on one file, in that file's folder."""
+    return subprocess.run(command(path), cwd=path.parent, capture_output=True, text=True, timeout=60, check=False)
+
+
+def the_line(text: str) -> str:
+    """The one line of an error, without regard to letter case."""
+    lines = [line for line in text.splitlines() if line.strip()]
+    assert len(lines) == 1, text
+    assert "traceback" not in lines[0].lower()
+    assert "panicked" not in lines[0].lower()
+    return lines[0].lower()
+
+
+def assert_refused(path: Path, words: tuple[str, ...] = ()) -> None:
+    """Exit 2, one line with the file's name and `words`, nothing written."""
+    before = sorted(path.parent.iterdir())
+    process = solve_file(path)
+    line = the_line(process.stderr)
+    assert process.returncode == 2, line
+    for word in (path.name, *words):
+        assert word.lower() in line, f"{word!r} not in {line!r}"
+    assert process.stdout.strip() == ""
+    assert sorted(path.parent.iterdir()) == before
+
+
+# ------------------------------------------------------------------------------------------------ scenarios
+
+
+def test_good_scenario_is_accepted(tmp_path: Path) -> None:
+    """What the cases below change is good: without the change it is solved and written."""
+    path = tmp_path / "good.toml"
+    path.write_text(toml(good()))
+    out = tmp_path / "result.json"
+    arguments = [sys.executable, "-m", "fishbone", "solve", str(path), "--out", str(out)]
+    process = subprocess.run(arguments, capture_output=True, text=True, timeout=60, check=False)
+    assert process.returncode == 0, process.stderr
+    assert json.loads(out.read_text())["status"] == "converged"
+
+
+@cases
+def test_command_line_refuses_with_one_line(case: Case, tmp_path: Path) -> None:
+    """Exit 2; the line names the file, the field and what was found."""
+    path = tmp_path / "scenario.toml"
+    path.write_text(toml(changed(case)))
+    assert_refused(path, case.words)
+
+
+@cases
+def test_python_refuses_with_one_line(case: Case) -> None:
+    """`InvalidScenario`, a `FishboneError` and a `ValueError`, before any solve."""
+    with pytest.raises(fb.InvalidScenario) as caught:
+        fb.solve(fb.Scenario.from_dict(changed(case)))
+    assert isinstance(caught.value, fb.FishboneError)
+    assert isinstance(caught.value, ValueError)
+    line = the_line(str(caught.value))
+    for word in case.words:
+        assert word.lower() in line, f"{word!r} not in {line!r}"
+
+
+@pytest.mark.parametrize("scale", [1.0 + 5e-7, 1.0 - 5e-7])
+def test_quaternion_within_a_millionth_of_unit_length_is_accepted(scale: float) -> None:
+    """The other side of the limit."""
+    scenario = good()
+    quaternion([scale, 0.0, 0.0, 0.0])(scenario)
+    assert solve_any(scenario).status == "converged"
+
+
+def test_zero_natural_bend_is_accepted() -> None:
+    """Spelling out a default is not asking for what is not there yet."""
+    scenario = good()
+    put("belt.natural_bend", 0.0)(scenario)
+    put("belt.closed", False)(scenario)
+    assert solve_any(scenario).status == "converged"
+
+
+def test_four_elements_are_accepted() -> None:
+    """The other side of the limit: the answer may be poor, but it is an answer."""
+    scenario = clamped((0.0, 0.6, 0.0), elements=4)
+    assert solve_any(scenario).u.shape == (5,)
+
+
+# ----------------------------------------------------------------------------------------------- infeasible
+
+
+TOO_FAR = {
+    "clamped": clamped((0.0, 1.25, 0.0)),
+    "pinned": {
+        **clamped((0.0, 1.25, 0.0)),
+        "supports": [
+            {"at": "start", "position": [1.0, 1.0, 1.0]},
+            {"at": "end", "position": [1.0, 1.0, 2.25]},
+        ],
+    },
+    "oblique": clamped((0.75, 0.0, 1.0), (0.1, 0.2, 0.3)),
+}
+too_far = pytest.mark.parametrize("name", TOO_FAR)
+
+
+@too_far
+def test_end_beyond_the_belts_length_is_infeasible(name: str) -> None:
+    """|x(U) − x(0)| = 1.25 > U = 1: a value, not an exception."""
+    assert solve_any(TOO_FAR[name]).status == "infeasible"
+
+
+@too_far
+def test_command_line_says_by_how_much_the_belt_is_too_short(name: str, tmp_path: Path) -> None:
+    """Exit 3, one line with the missing 0.25; `--out` is written and says so; no picture."""
+    path = tmp_path / "too_far.toml"
+    path.write_text(toml(TOO_FAR[name]))
+    process = solve_file(path)
+    line = the_line(process.stderr)
+    assert process.returncode == 3, line
+    assert "0.25" in line
+    written = json.loads((tmp_path / "result.json").read_text())
+    assert written["status"] == "infeasible"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["result.json", "too_far.toml"]
+
+
+# ---------------------------------------------------------------------------------------------------- files
+
+
+def test_missing_file_is_refused(tmp_path: Path) -> None:
+    """There is no such file."""
+    assert_refused(tmp_path / "missing.toml")
+
+
+def test_folder_is_refused(tmp_path: Path) -> None:
+    """A folder is not a file."""
+    folder = tmp_path / "folder.toml"
+    folder.mkdir()
+    assert_refused(folder)
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("empty.toml", b""),
+        ("empty.json", b""),
+        ("blank.toml", b"\n \n"),
+        ("syntax.toml", b"belt = {\n"),
+        ("syntax.json", b'{"belt": '),
+        ("list.json", b"[1, 2]"),
+        ("null.json", b"null"),
+        ("not_utf8.toml", b'name = "\xff\xfe"\n'),
+        ("binary.toml", bytes(range(256))),
+        ("binary.json", bytes(range(256))),
+        ("truncated.json", json.dumps(good()).encode()[:-10]),
+        ("twice.toml", b'energy = "sadowsky"\nenergy = "sadowsky"\n'),
+        ("deep.json", b"[" * 100_000),
+        ("deep.toml", b"a = " + b"[" * 100_000),
+    ],
+)
+def test_file_that_is_no_scenario_is_refused(name: str, content: bytes, tmp_path: Path) -> None:
+    """Nothing in it, not TOML or JSON, not text, not a table, a key twice, nested without end."""
+    path = tmp_path / name
+    path.write_bytes(content)
+    assert_refused(path)
+
+
+def test_dangling_link_is_refused(tmp_path: Path) -> None:
+    """Unreadable for anybody, root included."""
+    path = tmp_path / "dangling.toml"
+    path.symlink_to(tmp_path / "nowhere.toml")
+    assert_refused(path)
+
+
+def test_pipe_is_refused_without_waiting_for_it(tmp_path: Path) -> None:
+    """Reading a named pipe that nobody writes to would wait for ever."""
+    path = tmp_path / "pipe.toml"
+    os.mkfifo(path)
+    assert_refused(path)
+
+
+def peak_memory(path: Path) -> tuple[int, subprocess.CompletedProcess[str]]:
+    """Largest resident size of the command on one file, in bytes, measured by a parent of its own."""
+    watch = (
+        "import resource, subprocess, sys\n"
+        "code = subprocess.run(sys.argv[1:]).returncode\n"
+        "print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)\n"
+        "sys.exit(code)\n"
+    )
+    process = subprocess.run(
+        [sys.executable, "-c", watch, *command(path)],
+        cwd=path.parent,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    unit = 1 if sys.platform == "darwin" else 1024
+    return int(process.stdout.split()[-1]) * unit, process
+
+
+@pytest.mark.parametrize("suffix", [".toml", ".json"])
+def test_huge_file_is_refused_without_loading_it(suffix: str, tmp_path: Path) -> None:
+    """A good scenario and 100 MB of blank lines: refused in seconds, in hardly more memory than a missing file
+    takes."""
+    path = tmp_path / f"huge{suffix}"
+    text = (toml(good()) if suffix == ".toml" else json.dumps(good())).encode()
+    with path.open("wb") as file:
+        file.write(text)
+        for _ in range(HUGE_FILE // 1_000_000):
+            file.write(b"\n" * 1_000_000)
+    before = sorted(tmp_path.iterdir())
+
+    usual, _ = peak_memory(tmp_path / f"missing{suffix}")
+    start = time.monotonic()
+    peak, process = peak_memory(path)
+    elapsed = time.monotonic() - start
+
+    line = the_line(process.stderr)
+    assert process.returncode == 2, line
+    assert path.name in line
+    assert elapsed < HUGE_FILE_SECONDS
+    assert peak - usual < HUGE_FILE_MEMORY
+    assert sorted(tmp_path.iterdir()) == before
+    path.unlink()
+
+
+# ------------------------------------------------------------------------------------------------- JSON too
+
+
+@pytest.mark.parametrize(
+    "case",
+    [UNKNOWN_KEYS[3], WRONG_TYPES[0], MISSING[-1], NOT_YET[0]],
+    ids=lambda case: case.name,
+)
+def test_json_file_is_refused_like_a_toml_file(case: Case, tmp_path: Path) -> None:
+    """CONTRACT: the same structure as JSON is accepted everywhere."""
+    path = tmp_path / "scenario.json"
+    path.write_text(json.dumps(changed(case)))
+    assert_refused(path, case.words)

@@ -1,0 +1,259 @@
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import fishbone as fb
+from fishbone import cli, examples, files
+
+
+@pytest.fixture
+def run(capsys, monkeypatch, tmp_path):
+    """Runs the command line in an empty folder: exit code, standard output, standard error."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "100")
+
+    def run(*arguments):
+        code = cli.main([str(argument) for argument in arguments])
+        out, err = capsys.readouterr()
+        return code, out, err
+
+    return run
+
+
+@pytest.fixture
+def out_of_reach_file(tmp_path_factory, out_of_reach):
+    path = tmp_path_factory.mktemp("scenarios") / "far.json"
+    path.write_text(json.dumps(out_of_reach.to_dict()), "utf-8")
+    return path
+
+
+def assert_one_line(err, *parts):
+    assert err.startswith("fishbone: ")
+    assert err.endswith("\n")
+    assert err.count("\n") == 1
+    for part in parts:
+        assert str(part) in err
+
+
+def test_the_table_tells_what_people_ask_for(run, example_file):
+    code, out, err = run("solve", example_file)
+    assert (code, err) == (0, "")
+    for quantity in (
+        "energy",
+        "highest point",
+        "least bend radius",
+        "largest rib angle",
+        "iterations",
+        "residual",
+        "time",
+    ):
+        assert quantity in out
+    for place in ("start", "end"):
+        assert f"force on the belt, {place}" in out
+        assert f"moment on the belt, {place}" in out
+
+
+def test_all_outputs_are_written_and_nothing_else(run, example_file):
+    code, _, _ = run("solve", example_file, "--out", "a.json", "--figure", "a.png", "--mesh", "a.stl")
+    assert code == 0
+    assert sorted(path.name for path in Path().iterdir()) == ["a.json", "a.png", "a.stl"]
+    assert json.loads(Path("a.json").read_text("utf-8"))["schema"] == "fishbone.result/1"
+    assert Path("a.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_json_goes_to_the_screen_and_to_the_file_alike(run, example_file):
+    code, out, _ = run("solve", example_file, "--json", "--out", "a.json")
+    assert code == 0
+    assert out == Path("a.json").read_text("utf-8")
+
+
+def test_runs_differ_in_their_time_only(run, example_file):
+    results = [json.loads(run("solve", example_file, "--json")[1]) for _ in range(2)]
+    for result in results:
+        del result["solve_time"]
+    assert results[0] == results[1]
+
+
+def test_invalid_input_is_exit_2_and_one_line(run):
+    Path("wrong.toml").write_text("[belt]\nwidth = -1.0\nsegments = [{ kind = 'straight', length = 1.0 }]\n", "utf-8")
+    code, out, err = run("solve", "wrong.toml", "--out", "a.json")
+    assert (code, out) == (2, "")
+    assert_one_line(err, "fishbone: wrong.toml: belt.width: found -1")
+    assert not Path("a.json").exists()
+
+
+def test_a_missing_file_is_exit_2_and_one_line(run):
+    code, _, err = run("solve", "missing.toml")
+    assert code == 2
+    assert_one_line(err, "missing.toml")
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("solve",),
+        ("solve", "a.toml", "--colour"),
+        ("solve", "a.toml", "--out", "a.txt"),
+        ("solve", "a.toml", "--out", "nowhere/a.json"),
+        ("solve", "a.toml", "--out", "folder.json"),
+        ("solve", "a.toml", "--figure", "a.json"),
+        ("solve", "a.toml", "--mesh", "belt"),
+        ("twist",),
+        ("examples", "nothing"),
+        ("examples", "../example1"),
+    ],
+)
+def test_wrong_use_is_exit_2_and_one_line_before_any_solve(run, monkeypatch, arguments):
+    Path("folder.json").mkdir()
+    monkeypatch.setattr(fb, "solve", lambda _: pytest.fail("solved"))
+    code, out, err = run(*arguments)
+    assert (code, out) == (2, "")
+    assert_one_line(err)
+
+
+def test_a_read_only_folder_is_exit_2_before_any_solve(run, monkeypatch, example_file):
+    Path("locked").mkdir()
+    # The superuser may write anywhere: let the system answer as it would for anyone else.
+    monkeypatch.setattr(files.os, "access", lambda folder, _: Path(folder).name != "locked")
+    monkeypatch.setattr(fb, "solve", lambda _: pytest.fail("solved"))
+    code, _, err = run("solve", example_file, "--out", "locked/a.json")
+    assert code == 2
+    assert_one_line(err, "locked")
+
+
+def test_the_scenario_is_not_overwritten_by_its_result(run, example):
+    text = json.dumps(example.to_dict())
+    Path("a.json").write_text(text, "utf-8")
+    code, _, err = run("solve", "a.json", "--out", "./a.json")
+    assert code == 2
+    assert_one_line(err, "a.json")
+    assert Path("a.json").read_text("utf-8") == text
+
+
+def test_no_equilibrium_is_exit_3_with_a_result_and_no_picture(run, out_of_reach_file):
+    code, out, err = run("solve", out_of_reach_file, "--out", "a.json", "--figure", "a.png", "--mesh", "a.ply")
+    assert (code, out) == (3, "")
+    assert_one_line(err, out_of_reach_file, "infeasible")
+    assert [path.name for path in Path().iterdir()] == ["a.json"]
+    assert json.loads(Path("a.json").read_text("utf-8"))["status"] == "infeasible"
+
+
+def test_no_equilibrium_is_still_json_for_machines(run, out_of_reach_file):
+    code, out, err = run("solve", out_of_reach_file, "--json")
+    assert code == 3
+    assert json.loads(out)["status"] == "infeasible"
+    assert_one_line(err)
+
+
+@pytest.mark.parametrize("package", ["matplotlib", "trimesh"])
+def test_a_missing_package_is_said_before_the_solve(run, monkeypatch, example_file, package):
+    module, option = {"matplotlib": ("plot", "--figure"), "trimesh": ("export", "--mesh")}[package]
+    monkeypatch.delitem(sys.modules, f"fishbone.{module}", raising=False)
+    monkeypatch.delattr(fb, module, raising=False)
+    monkeypatch.setitem(sys.modules, package, None)
+    monkeypatch.setattr(fb, "solve", lambda _: pytest.fail("solved"))
+    code, _, err = run("solve", example_file, option, "a.png" if module == "plot" else "a.stl")
+    assert code == 2
+    assert_one_line(err, package, "pip install")
+
+
+def test_control_c_is_exit_130_and_one_line(run, monkeypatch, example_file):
+    def interrupt(_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(fb, "solve", interrupt)
+    code, out, err = run("solve", example_file)
+    assert (code, out) == (130, "")
+    assert_one_line(err, "interrupted")
+
+
+class _Panic(BaseException):
+    pass
+
+
+@pytest.mark.parametrize("bug", [ZeroDivisionError("two\nlines"), _Panic("panicked")])
+def test_a_bug_is_one_line_too(run, monkeypatch, example_file, bug):
+    def fail(_):
+        raise bug
+
+    monkeypatch.setattr(fb, "solve", fail)
+    code, out, err = run("solve", example_file)
+    assert (code, out) == (1, "")
+    assert_one_line(err, "internal error")
+
+
+def test_a_result_is_written_whole_or_not_at_all(run, monkeypatch, example_file):
+    Path("a.json").write_text("as before", "utf-8")
+
+    def full(self, target):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "replace", full)
+    code, _, err = run("solve", example_file, "--out", "a.json")
+    assert code == 1
+    assert_one_line(err, "a.json", "No space left")
+    assert [path.name for path in Path().iterdir()] == ["a.json"]
+    assert Path("a.json").read_text("utf-8") == "as before"
+
+
+def test_a_link_stays_a_link(tmp_path):
+    target, link = tmp_path / "target.json", tmp_path / "link.json"
+    target.write_text("as before", "utf-8")
+    link.symlink_to(target)
+    files.write_whole(link, b"new")
+    assert link.is_symlink()
+    assert target.read_bytes() == b"new"
+
+
+def test_examples_are_listed_with_what_they_are(run, example_file):
+    code, out, _ = run("examples")
+    assert code == 0
+    lines = out.splitlines()
+    assert [line.split()[0] for line in lines] == sorted(path.stem for path in example_file.parent.glob("*.toml"))
+    assert all(len(line.split()) > 1 for line in lines)
+
+
+def test_an_example_is_copied_and_solves(run, example_file):
+    code, _, _ = run("examples", "example1")
+    assert code == 0
+    assert Path("example1.toml").read_bytes() == example_file.read_bytes()
+    assert run("solve", "example1.toml")[0] == 0
+
+
+def test_an_example_is_not_copied_over_ones_own_file_unasked(run):
+    Path("example1.toml").write_text("mine", "utf-8")
+    code, _, err = run("examples", "example1")
+    assert code == 2
+    assert_one_line(err, "example1.toml", "--force")
+    assert Path("example1.toml").read_text("utf-8") == "mine"
+    assert run("examples", "example1", "--force")[0] == 0
+    assert Path("example1.toml").read_text("utf-8") == examples.text("example1")
+
+
+@pytest.mark.parametrize("name", examples.names())
+def test_every_shipped_scenario_is_valid(name, tmp_path):
+    path = tmp_path / f"{name}.toml"
+    path.write_text(examples.text(name), "utf-8")
+    assert fb.load(path).to_dict()["name"]
+
+
+def test_version_and_help_are_exit_0(run):
+    assert run()[1] == run("--help")[1]
+    assert run()[0] == run("--help")[0] == 0
+    assert run("--version")[:2] == (0, f"fishbone, version {fb.__version__}\n")
+    code, out, _ = run("solve", "--help")
+    assert code == 0
+    for option in ("--out", "--figure", "--mesh", "--json"):
+        assert option in out
+
+
+def test_the_installed_command_passes_its_exit_code_on(example_file, tmp_path):
+    command = [Path(sys.executable).with_name("fishbone"), "solve"]
+    good = subprocess.run([*command, example_file], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (good.returncode, good.stderr) == (0, "")
+    bad = subprocess.run([*command, "missing.toml"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (bad.returncode, bad.stdout) == (2, "")
+    assert_one_line(bad.stderr)

@@ -1,0 +1,97 @@
+import hashlib
+import io
+import struct
+import sys
+
+import numpy as np
+import pytest
+import trimesh
+
+import fishbone as fb
+from fishbone import export, plot
+
+
+def test_the_views_have_one_scale(equilibrium):
+    figure = plot.views(equilibrium)
+    figure.draw_without_rendering()
+    views = [axes for axes in figure.axes if "view" in axes.get_title()]
+    scales = [axes.bbox.width / np.ptp(axes.get_xlim()) for axes in views]
+    scales += [axes.bbox.height / np.ptp(axes.get_ylim()) for axes in views]
+    assert len(views) == 3
+    np.testing.assert_allclose(scales, scales[0], rtol=1e-6)
+
+
+def test_the_views_hold_the_whole_belt(equilibrium):
+    points = equilibrium.surface().reshape(-1, 3)
+    columns = {"Top": (1, 2), "Front": (1, 0), "Side": (2, 0)}
+    for axes in plot.views(equilibrium).axes:
+        if axes.get_title().split(" ")[0] in columns:
+            right, up = columns[axes.get_title().split(" ")[0]]
+            for column, (low, high) in ((right, axes.get_xlim()), (up, axes.get_ylim())):
+                assert low < points[:, column].min()
+                assert points[:, column].max() < high
+
+
+def test_the_graphs_show_the_rib_angle_in_degrees_and_the_bend(equilibrium):
+    graphs = {axes.get_title(): axes.lines[-1].get_ydata() for axes in plot.views(equilibrium).axes if axes.lines}
+    np.testing.assert_array_equal(graphs["Rib angle"], np.degrees(equilibrium.rib_angle))
+    np.testing.assert_array_equal(graphs["Bend"], equilibrium.bend)
+
+
+@pytest.mark.parametrize("suffix", plot.SUFFIXES)
+def test_the_same_shape_gives_the_same_file(equilibrium, example, suffix):
+    digests = {hashlib.sha256(plot.encode(one, suffix)).digest() for one in (equilibrium, fb.solve(example))}
+    assert len(digests) == 1
+
+
+def test_a_picture_is_fine_enough_to_print(equilibrium, tmp_path):
+    path = tmp_path / "views.png"
+    plot.save(equilibrium, path)
+    width, _ = struct.unpack(">II", path.read_bytes()[16:24])
+    assert width >= 2000
+
+
+def test_a_name_with_markup_is_drawn_as_it_is(example):
+    named = fb.Scenario.from_dict(example.to_dict() | {"name": r"$\bad_{"})
+    plot.encode(fb.solve(named), ".svg")
+
+
+def test_a_picture_leaves_the_users_settings_alone(equilibrium):
+    before = dict(plot.mpl.rcParams)
+    plot.encode(equilibrium, ".png")
+    assert dict(plot.mpl.rcParams) == before
+
+
+@pytest.mark.parametrize("suffix", export.SUFFIXES)
+def test_meshes_hold_the_surface(equilibrium, tmp_path, suffix):
+    path = tmp_path / f"belt{suffix}"
+    export.save(equilibrium, path)
+    mesh = trimesh.load(io.BytesIO(path.read_bytes()), file_type=suffix[1:], force="mesh")
+    surface = equilibrium.surface().reshape(-1, 3)
+    np.testing.assert_allclose(mesh.bounds, [surface.min(axis=0), surface.max(axis=0)], atol=1e-6)
+    # A belt is inextensible: bent or flat, its area is U V.
+    assert mesh.area == pytest.approx(1.0 * 0.1, rel=1e-2)
+
+
+def test_the_mesh_faces_the_normal(equilibrium):
+    normals = export.mesh(equilibrium).face_normals
+    assert normals[0] @ equilibrium.frame[0, :, 0] > 0.0
+
+
+@pytest.mark.parametrize("module", [plot, export])
+def test_another_suffix_is_refused(equilibrium, tmp_path, module):
+    with pytest.raises(fb.InvalidArgument, match=r"found \.bmp, allowed \."):
+        module.save(equilibrium, tmp_path / "belt.bmp")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("module", "package", "extra"), [("plot", "matplotlib", "plot"), ("export", "trimesh", "mesh")]
+)
+def test_a_missing_package_says_how_to_get_it(monkeypatch, module, package, extra):
+    monkeypatch.delitem(sys.modules, f"fishbone.{module}")
+    monkeypatch.delattr(fb, module)
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(fb.MissingPackage) as refusal:
+        __import__(f"fishbone.{module}")
+    assert f'pip install "fishbone[{extra}]"' in str(refusal.value)
