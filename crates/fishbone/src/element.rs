@@ -7,13 +7,20 @@ use crate::energy::EnergyModel;
 use crate::lie::{Coefficients, Pose, Twist, gauss_points, hat, magnus};
 use nalgebra::{Matrix3, Matrix3x4, Matrix4, RowVector4, Vector3, Vector4};
 
+/// Torsion ω_η = −β ω_ζ.
+///
+/// Source: Eq. (32)
+pub fn torsion(bend: f64, rib_slope: f64) -> f64 {
+    -rib_slope * bend
+}
+
 /// The twist of the pose per unit u, body axes: along η, and by the rates (κ_g, −β ω_ζ, ω_ζ).
 ///
 /// Source: Eq. (3), (4), (25), (32)
 pub fn strain(geodesic: f64, bend: f64, rib_slope: f64) -> Twist {
     Twist {
         translation: Vector3::y(),
-        rotation: Vector3::new(geodesic, -rib_slope * bend, bend),
+        rotation: Vector3::new(geodesic, torsion(bend, rib_slope), bend),
     }
 }
 

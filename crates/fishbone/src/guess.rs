@@ -214,3 +214,102 @@ fn place(point: &mut BeltPoint, start: Option<&NodeSupport>, end: Option<&NodeSu
         pose.position += shift;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::element::Element;
+    use crate::energy::EnergyModel;
+    use nalgebra::UnitQuaternion;
+
+    fn held(node: usize, position: [f64; 3], rotation: Option<[f64; 3]>) -> NodeSupport {
+        NodeSupport {
+            node,
+            position: position.map(Some),
+            frame: rotation.map(|r| UnitQuaternion::from_scaled_axis(Vector3::from(r))),
+            square_rib: false,
+        }
+    }
+
+    fn program(supports: Vec<NodeSupport>) -> BeltProgram {
+        let element = Element {
+            length: 0.025,
+            geodesic: 0.0,
+            rigidity: [1.0; 2],
+            half_width: 0.05,
+        };
+        BeltProgram {
+            elements: vec![element; 40],
+            model: EnergyModel::Wunderlich,
+            supports,
+        }
+    }
+
+    fn end(point: &BeltPoint) -> Vector3<f64> {
+        point.poses.last().unwrap().position
+    }
+
+    #[test]
+    fn test_arch_between_facing_clamps_meets_both_and_rises_to_the_bulge() {
+        for distance in [0.2, 0.6, 0.99, 0.9999] {
+            for side in [1.0, -1.0] {
+                let clamps = vec![
+                    held(0, [0.3, 0.0, 0.0], Some([0.0; 3])),
+                    held(40, [0.3, distance, 0.0], Some([0.0; 3])),
+                ];
+                let point = guess(&program(clamps), &(side * Vector3::x()));
+                assert!((end(&point) - Vector3::new(0.3, distance, 0.0)).norm() < 1e-2);
+                assert!(side * (point.poses[20].position.x - 0.3) > 0.0);
+            }
+        }
+    }
+
+    #[test]
+    fn test_fold_by_a_half_turn_starts_folded() {
+        let clamps = vec![
+            held(0, [0.0; 3], Some([0.0; 3])),
+            held(40, [-0.4, 0.0, 0.0], Some([0.0, 0.0, PI])),
+        ];
+        let point = guess(&program(clamps), &Vector3::x());
+        let tangent = point.poses[40].frame.column(1).into_owned();
+        assert!((tangent + Vector3::y()).norm() < 1e-6);
+    }
+
+    #[test]
+    fn test_pins_are_met_and_the_belt_bulges_between_them() {
+        let pins = vec![
+            held(0, [0.0, 0.1, 0.2], None),
+            held(40, [0.5, 0.3, 0.4], None),
+        ];
+        let bulge = Vector3::new(0.0, 0.0, -1.0);
+        let point = guess(&program(pins), &bulge);
+        assert!((end(&point) - Vector3::new(0.5, 0.3, 0.4)).norm() < 2e-3);
+        assert!((point.poses[20].position - point.poses[0].position).dot(&bulge) > 0.2);
+    }
+
+    #[test]
+    fn test_belt_held_at_its_end_alone_is_straight_and_ends_there() {
+        let point = guess(
+            &program(vec![held(40, [1.0, 2.0, 3.0], Some([0.0, 0.0, PI / 2.0]))]),
+            &Vector3::x(),
+        );
+        assert!((end(&point) - Vector3::new(1.0, 2.0, 3.0)).norm() < 1e-12);
+        assert!((point.poses[0].position - Vector3::new(2.0, 2.0, 3.0)).norm() < 1e-9);
+    }
+
+    #[test]
+    fn test_disturbed_start_keeps_its_ribs_apart() {
+        let clamps = vec![
+            held(0, [0.0; 3], Some([0.0; 3])),
+            held(40, [0.0, 0.5, 0.0], Some([0.0; 3])),
+        ];
+        let program = program(clamps);
+        let start = guess(&program, &Vector3::x());
+        let disturbed = disturb(&program, &start, 0.4);
+        for pair in disturbed.fields.windows(2) {
+            assert!((pair[1][1] - pair[0][1]).abs() * 0.05 / 0.025 < 1.0);
+        }
+        assert_eq!((disturbed.fields[0][1], disturbed.poses.len()), (0.0, 41));
+        assert!(disturbed.poses[20].position.z.abs() > 1e-3);
+    }
+}

@@ -1,8 +1,7 @@
 //! The solved centre line with its ribs: what the surface and every report are drawn from.
 
-use crate::element::increment;
+use crate::element::{increment, torsion};
 use crate::lie::Pose;
-use crate::surface::{curvature, rib_angle, torsion};
 use nalgebra::Vector4;
 
 /// The spine at its nodes, in the units of the scenario.
@@ -76,21 +75,8 @@ impl Spine {
     ///
     /// Source: Eq. (32)
     pub fn torsion(&self) -> Vec<f64> {
-        self.map_fields(torsion)
-    }
-
-    /// Rib angle α = atan β at every node.
-    ///
-    /// Source: Eq. (31)
-    pub fn rib_angle(&self) -> Vec<f64> {
-        self.rib_slope.iter().copied().map(rib_angle).collect()
-    }
-
-    /// The non-zero principal curvature κ₁ = −ω_ζ (1 + β²) at every node.
-    ///
-    /// Source: Eq. (29)
-    pub fn curvature(&self) -> Vec<f64> {
-        self.map_fields(curvature)
+        let fields = self.bend.iter().zip(&self.rib_slope);
+        fields.map(|(&bend, &slope)| torsion(bend, slope)).collect()
     }
 
     /// Total torsion ∫ ω_η du.
@@ -182,11 +168,6 @@ impl Spine {
             torsion(bend, rib_slope)
         };
         length / 6.0 * (at(0.0) + 4.0 * at(0.5 * length) + at(length))
-    }
-
-    fn map_fields(&self, f: impl Fn(f64, f64) -> f64) -> Vec<f64> {
-        let fields = self.bend.iter().zip(&self.rib_slope);
-        fields.map(|(&bend, &slope)| f(bend, slope)).collect()
     }
 }
 

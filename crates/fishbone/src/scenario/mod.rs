@@ -10,6 +10,7 @@ mod untagged;
 mod validate;
 
 pub use crate::energy::EnergyModel;
+use crate::ritz::Options;
 pub use parse::{LONGEST_JSON, LONGEST_TOML};
 
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
@@ -354,11 +355,17 @@ pub struct RitzSpec {
 
 impl Default for RitzSpec {
     fn default() -> Self {
+        let Options {
+            basis,
+            points,
+            penalty,
+            updates,
+        } = Options::default();
         Self {
-            basis: 10,
-            points: 16,
-            penalty: 1e2,
-            updates: 1,
+            basis,
+            points,
+            penalty,
+            updates,
         }
     }
 }

@@ -507,8 +507,8 @@ mod tests {
 
         fn retract(&self, ride: &Ride, step: &[NodeVector], length: f64, into: &mut Ride) {
             into.position[0] = ride.position[0] + length * step[0][0];
-            for k in 0..=STAGES {
-                into.push[k] = [0, 1].map(|i| ride.push[k][i] + length * step[k][6 + i]);
+            for (k, change) in step.iter().enumerate() {
+                into.push[k] = [0, 1].map(|i| ride.push[k][i] + length * change[6 + i]);
             }
         }
     }

@@ -1,5 +1,8 @@
 //! Fundamental forms and curvatures.
 
+use super::rib_angle;
+use crate::element::torsion;
+use crate::spine::Spine;
 use nalgebra::{Matrix3, Vector3};
 
 /// Coefficients of the first fundamental form.
@@ -142,13 +145,6 @@ pub fn mean_curvature_on_spine(bend: f64, transverse: f64) -> f64 {
     0.5 * (transverse - bend)
 }
 
-/// Torsion ω_η = −β ω_ζ.
-///
-/// Source: Eq. (32)
-pub fn torsion(bend: f64, rib_slope: f64) -> f64 {
-    -rib_slope * bend
-}
-
 /// Transverse curvature δ = −ω_ζ β².
 ///
 /// Written in β, not as −ω_η²/ω_ζ: nothing is divided by a bend that may vanish.
@@ -180,6 +176,25 @@ pub fn bend_radius(curvature: f64, rib_convergence: f64, v: f64) -> f64 {
         return f64::INFINITY;
     }
     (1.0 - v * rib_convergence).max(0.0) / curvature.abs()
+}
+
+impl Spine {
+    /// Rib angle α = atan β at every node.
+    ///
+    /// Source: Eq. (31)
+    pub fn rib_angle(&self) -> Vec<f64> {
+        self.rib_slope.iter().copied().map(rib_angle).collect()
+    }
+
+    /// The non-zero principal curvature κ₁ = −ω_ζ (1 + β²) at every node.
+    ///
+    /// Source: Eq. (29)
+    pub fn curvature(&self) -> Vec<f64> {
+        let fields = self.bend.iter().zip(&self.rib_slope);
+        fields
+            .map(|(&bend, &slope)| curvature(bend, slope))
+            .collect()
+    }
 }
 
 #[cfg(test)]

@@ -340,7 +340,7 @@ mod tests {
     #[test]
     fn test_rib_angle_has_the_slope_of_the_rates() {
         for (bend, slope) in [(2.0, 0.7), (-2.0, 0.7), (0.5, -3.0)] {
-            let torsion = crate::surface::torsion(bend, slope);
+            let torsion = crate::element::torsion(bend, slope);
             let angle = rib_angle_from_rates(bend, torsion).unwrap_or(f64::NAN);
             assert_relative_eq!(angle, rib_angle(slope), epsilon = 1e-15);
         }

@@ -1,0 +1,125 @@
+//! The shipped scenarios, solved: the golden cases of every suite.
+
+use fishbone::equilibrium::{Equilibrium, Status, solve};
+use fishbone::scenario::Scenario;
+use std::ops::ControlFlow;
+
+fn solved(text: &str) -> Equilibrium {
+    let scenario = Scenario::from_toml(text).unwrap();
+    solve(&scenario, &mut || ControlFlow::Continue(()))
+}
+
+/// Converged to a minimum: residuals, supports and bounds, whatever the solver says of them.
+fn assert_minimum(equilibrium: &Equilibrium) {
+    assert_eq!(
+        equilibrium.status,
+        Status::Converged,
+        "{}",
+        equilibrium.message
+    );
+    assert_eq!(equilibrium.stable, Some(true));
+    assert!(equilibrium.residuals.largest() <= 1e-8);
+    let (spine, scenario) = (&equilibrium.spine, &equilibrium.scenario);
+    for (support, pose) in scenario
+        .supports
+        .iter()
+        .zip([spine.pose[0], spine.pose[spine.u.len() - 1]])
+    {
+        let length = spine.length();
+        assert!((pose.position - support.point().unwrap()).norm() <= 1e-7 * length);
+        assert!((pose.frame - support.frame().unwrap()).norm() <= 1e-7);
+    }
+    for k in 1..spine.u.len() {
+        let rate = (spine.rib_slope[k] - spine.rib_slope[k - 1]) / (spine.u[k] - spine.u[k - 1]);
+        assert!(rate.abs() <= 2.0 / spine.width);
+    }
+}
+
+fn assert_near(value: f64, expected: f64, tolerance: f64) {
+    assert!(
+        (value - expected).abs() <= tolerance,
+        "{value} for {expected}"
+    );
+}
+
+#[test]
+fn test_example_1_is_that_of_an_independent_solver() {
+    let equilibrium = solved(include_str!("../../../scenarios/example1.toml"));
+    assert_minimum(&equilibrium);
+    assert_near(equilibrium.energy, 23.50, 0.05);
+    assert_near(equilibrium.highest_point().position.x, 0.369, 5e-4);
+}
+
+#[test]
+fn test_example_2_is_that_of_an_independent_solver() {
+    let equilibrium = solved(include_str!("../../../scenarios/example2.toml"));
+    assert_minimum(&equilibrium);
+    assert_near(equilibrium.energy, 18.95, 0.05);
+    let peak = equilibrium.highest_point().position;
+    assert_near(peak.x, 0.294, 0.005);
+    assert_near(peak.y, 0.43, 0.01);
+    assert_near(peak.z, -0.067, 0.005);
+}
+
+#[test]
+fn test_polystyrene_sheet_is_example_1_in_si_with_the_plates_energy() {
+    let equilibrium = solved(include_str!("../../../scenarios/polystyrene.toml"));
+    assert_minimum(&equilibrium);
+    let rigidity = 3.2e9 * 140e-6f64.powi(3) * 0.02 / (12.0 * (1.0 - 0.34f64.powi(2)));
+    assert_near(equilibrium.energy * 0.2 / rigidity, 23.60, 0.003 * 23.60);
+    assert_near(equilibrium.highest_point().position.x / 0.2, 0.3684, 3e-3);
+}
+
+#[test]
+fn test_planar_and_twisted_belts_converge_to_minima() {
+    let planar = solved(include_str!("../../../scenarios/planar.toml"));
+    assert_minimum(&planar);
+    assert!(
+        planar
+            .spine
+            .rib_slope
+            .iter()
+            .all(|slope| slope.abs() < 1e-9)
+    );
+    let twisted = solved(include_str!("../../../scenarios/twist.toml"));
+    assert_minimum(&twisted);
+    assert!(twisted.spine.twist() > 1.0);
+}
+
+#[test]
+fn test_solves_are_identical_bit_by_bit() {
+    let text = include_str!("../../../scenarios/example2.toml");
+    assert_eq!(solved(text).to_json(), solved(text).to_json());
+}
+
+#[test]
+fn test_the_sources_own_method_never_calls_its_compromise_converged() {
+    let text = include_str!("../../../scenarios/example1.toml");
+    let equilibrium = solved(&format!("{text}\n[solver]\nmethod = \"ritz\"\n"));
+    assert_eq!(equilibrium.status, Status::NotConverged);
+    assert_eq!((equilibrium.stable, equilibrium.reactions.len()), (None, 0));
+    assert!(equilibrium.residuals.constraint > 1e-2);
+    assert_near(equilibrium.highest_point().position.x, 0.35, 5e-3);
+}
+
+#[test]
+fn test_supports_out_of_reach_are_infeasible_by_the_missing_length() {
+    let text = include_str!("../../../scenarios/example1.toml");
+    let equilibrium = solved(&text.replace("[0.0, 0.5, 0.1]", "[0.0, 1.25, 0.0]"));
+    assert_eq!(equilibrium.status, Status::Infeasible);
+    assert!(
+        equilibrium.message.contains("0.25"),
+        "{}",
+        equilibrium.message
+    );
+}
+
+#[test]
+fn test_caller_ends_a_solve() {
+    let scenario = Scenario::from_toml(include_str!("../../../scenarios/example1.toml")).unwrap();
+    let equilibrium = solve(&scenario, &mut || ControlFlow::Break(()));
+    assert_eq!(
+        (equilibrium.status, equilibrium.iterations),
+        (Status::NotConverged, 0)
+    );
+}
