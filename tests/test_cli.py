@@ -257,3 +257,18 @@ def test_the_installed_command_passes_its_exit_code_on(example_file, tmp_path):
     bad = subprocess.run([*command, "missing.toml"], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert (bad.returncode, bad.stdout) == (2, "")
     assert_one_line(bad.stderr)
+
+
+def test_elements_too_long_for_the_width_are_warned_of(run, example):
+    tables = example.to_dict()
+    tables["solver"]["elements"] = 40
+    Path("coarse.json").write_text(json.dumps(tables), "utf-8")
+    code, out, err = run("solve", "coarse.json")
+    assert code == 0
+    assert "energy" in out
+    assert_one_line(err, "coarse.json", "warning", "80")
+
+
+def test_default_elements_are_not_warned_of(run, example_file):
+    code, _, err = run("solve", example_file)
+    assert (code, err) == (0, "")

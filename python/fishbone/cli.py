@@ -155,6 +155,8 @@ def _print(equilibrium: Equilibrium, file: Path, *, as_json: bool) -> None:
         from fishbone.report import report  # noqa: PLC0415
 
         Console(highlight=False).print(report(equilibrium))
+    for warning in equilibrium.warnings:
+        click.echo(f"fishbone: {file}: warning: {warning}", err=True)
 
 
 @command.command()

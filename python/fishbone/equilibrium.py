@@ -111,6 +111,11 @@ class Equilibrium:
         return self._inner.message
 
     @property
+    def warnings(self) -> list[str]:
+        """What should be known before the result is relied on, one line each."""
+        return self._inner.warnings
+
+    @property
     def energy(self) -> float:
         """Total potential, loads included."""
         return self._inner.energy

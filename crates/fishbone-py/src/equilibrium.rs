@@ -78,6 +78,11 @@ impl Equilibrium {
     }
 
     #[getter]
+    fn warnings(&self) -> Vec<String> {
+        self.solved.warnings.clone()
+    }
+
+    #[getter]
     fn energy(&self) -> f64 {
         self.solved.energy
     }

@@ -51,6 +51,8 @@ pub struct Equilibrium {
     pub status: Status,
     /// One line for people: how it ended, and what to try.
     pub message: String,
+    /// What should be known before the result is relied on, one line each.
+    pub warnings: Vec<String>,
     /// Total potential, loads included.
     pub energy: f64,
     /// Elastic energy alone.

@@ -51,16 +51,18 @@ pub(super) fn solve(
     let energy = solution.values.objective * units.energy;
     let spine = units.spine(&program, &solution.point, belt.width);
     let internal = program.internal(&solution.point, &solution.multipliers);
+    let stable = stable(status, solution.curvature);
     Equilibrium {
         status,
         message,
+        warnings: warnings(&program, stable),
         energy,
         elastic_energy: energy,
         torsion: spine.torsion(),
         spine,
         internal: internal.into_iter().map(|w| units.wrench(w)).collect(),
         reactions: reactions(scenario, &program, &solution, units),
-        stable: stable(status, solution.curvature),
+        stable,
         residuals: solution.residuals,
         iterations: solution.iterations,
         scenario: scenario.clone(),
@@ -215,6 +217,30 @@ fn judge(solution: &Solution<BeltPoint>, tolerance: f64) -> (Status, String) {
             format!("interrupted after {iterations} iterations, largest residual {largest:.1e}"),
         ),
     }
+}
+
+fn warnings(program: &BeltProgram, stable: Option<bool>) -> Vec<String> {
+    // Strong twist makes facets of the scale of V, which longer elements cannot resolve.
+    const SAFE: f64 = 8.0;
+    let shares = program
+        .elements
+        .iter()
+        .map(|e| e.length / (2.0 * e.half_width));
+    let longest = shares.fold(0.0, f64::max);
+    let coarse = longest * SAFE > 1.0 + 1e-9;
+    let saddle = stable == Some(false);
+    [
+        coarse.then(|| {
+            format!(
+                "elements of {longest:.2} V may settle on a false level: V/8 is safe, so raise solver.elements to {:.0}",
+                (SAFE * longest * program.elements.len() as f64).ceil()
+            )
+        }),
+        saddle.then(|| "the equilibrium is no minimum of the energy: try another solver.bulge".to_owned()),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
 }
 
 fn stable(status: Status, curvature: Curvature) -> Option<bool> {

@@ -75,6 +75,7 @@ fn report(scenario: &Scenario, belt: &Belt, start: &Pose, solution: &Solution) -
         scenario: scenario.clone(),
         status: Status::NotConverged,
         message: message(solution),
+        warnings: Vec::new(),
         energy,
         elastic_energy: energy,
         torsion: rate(1).collect(),
