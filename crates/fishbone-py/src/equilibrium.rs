@@ -42,11 +42,10 @@ impl Signals {
     }
 
     fn proceed(&mut self) -> ControlFlow<()> {
-        if self.asked.elapsed() < SIGNAL_INTERVAL {
-            return ControlFlow::Continue(());
+        if self.raised.is_none() && self.asked.elapsed() >= SIGNAL_INTERVAL {
+            self.asked = Instant::now();
+            self.raised = Python::attach(|py| py.check_signals()).err();
         }
-        self.asked = Instant::now();
-        self.raised = Python::attach(|py| py.check_signals()).err();
         match self.raised {
             Some(_) => ControlFlow::Break(()),
             None => ControlFlow::Continue(()),

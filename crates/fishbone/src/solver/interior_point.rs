@@ -34,6 +34,7 @@ struct State<'a, P: Program> {
     bound_multipliers: Bounds,
     barrier: f64,
     iteration: usize,
+    interrupted: bool,
     linear: Linearisation,
     newton: Newton,
     filter: Filter,
@@ -74,6 +75,7 @@ impl<'a, P: Program> State<'a, P> {
             bound_multipliers: bounds.clone(),
             barrier: settings.barrier,
             iteration: 0,
+            interrupted: false,
             gradient: linear.gradient.clone(),
             plain_step: linear.gradient.clone(),
             linear,
@@ -96,7 +98,7 @@ impl<'a, P: Program> State<'a, P> {
             if self.iteration >= self.settings.iterations {
                 return Outcome::IterationLimit;
             }
-            if proceed().is_break() {
+            if self.is_interrupted(proceed) {
                 return Outcome::Interrupted;
             }
             self.lower_barrier();
@@ -114,7 +116,15 @@ impl<'a, P: Program> State<'a, P> {
         }
     }
 
+    /// Asks the caller, who need not say so twice.
+    fn is_interrupted(&mut self, proceed: &mut dyn FnMut() -> ControlFlow<()>) -> bool {
+        self.interrupted = self.interrupted || proceed().is_break();
+        self.interrupted
+    }
+
     fn finish(mut self, outcome: Outcome) -> Solution<P::Point> {
+        // A failed restoration leaves its own derivatives behind.
+        self.linearise();
         self.newton
             .assemble(&self.linear, &self.values, &self.bound_multipliers);
         let curvature = self.newton.curvature();
@@ -338,7 +348,7 @@ impl<'a, P: Program> State<'a, P> {
         let left = self.measure(&self.values);
         self.filter.leave(left);
         self.multipliers.fill(Rows::zeros());
-        while self.iteration < self.settings.iterations && proceed().is_continue() {
+        while self.iteration < self.settings.iterations && !self.is_interrupted(proceed) {
             self.iteration += 1;
             self.centre_bound_multipliers();
             if !self.step_toward_constraints() {
