@@ -1,6 +1,7 @@
 # make demo    solves example 1: the table here, out/example1.json and out/example1.png
 # make test    everything that must hold
-# make clean   removes what these two made
+# make figures draws the pictures of README.md and docs
+# make clean   removes what these made
 #
 # Needs cargo, Python 3.10 or newer and make; everything else goes into .venv.
 
@@ -14,10 +15,10 @@ NEED_CARGO := @command -v cargo >/dev/null || { echo "fishbone needs cargo, whic
 
 # What each step depends on, so that a second run does only what has changed.
 RUST_SOURCES := Cargo.toml Cargo.lock $(shell find crates scenarios -type f)
-PYTHON_SOURCES := pyproject.toml $(shell find python tests -name '*.py' -o -name '*.pyi')
+PYTHON_SOURCES := pyproject.toml $(shell find python tests benchmarks docs -name '*.py' -o -name '*.pyi')
 TEXTS := $(shell find README.md docs scenarios tests -type f -not -name '*.pyc' 2>/dev/null)
 
-.PHONY: help demo test clean
+.PHONY: help demo test figures clean
 .DELETE_ON_ERROR:
 
 help:
@@ -30,6 +31,9 @@ demo: $(CORE)
 
 test: $(VENV)/.rust $(VENV)/.lint $(VENV)/.pytest
 	@echo "all tests pass"
+
+figures: $(CORE)
+	@PYTHONPATH=benchmarks $(BIN)/python docs/make_figures.py
 
 clean:
 	@rm -rf $(VENV) out dist $(CORE)

@@ -1,0 +1,129 @@
+"""The cases that tables and figures share, and what is measured on them."""
+
+from __future__ import annotations
+
+import functools
+import json
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+from scipy.linalg import expm
+from scipy.spatial.transform import Rotation
+
+import fishbone as fb
+from tables import ROOT
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+
+ENERGIES = ("fishbone", "sadowsky", "wunderlich")
+EXAMPLES = ("example1", "example2")
+SHELLS = ROOT / "tests" / "data" / "shell"
+SHEET = 0.0007
+"""Thickness of the source's sheet in U: 140 µm of 200 mm."""
+
+
+def clamped(
+    position: Any, rotation: Any = (0.0, 0.0, 0.0), *, square_rib: bool = True, **belt: float
+) -> dict[str, Any]:
+    """Tables of a straight belt from the natural pose to another one."""
+    length = belt.pop("length", 1.0)
+    ends = (("start", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), ("end", position, rotation))
+    return {
+        "belt": {"width": 0.1, "rigidity": 1.0, "segments": [{"kind": "straight", "length": length}]} | belt,
+        "supports": [{"at": at, "position": x, "rotation": r, "square_rib": square_rib} for at, x, r in ends],
+    }
+
+
+def helix(bend: float, slope: float) -> tuple[Floats, Rotation]:
+    """End pose of a belt of unit length and constant bend and rib slope, as the exponential of its twist."""
+    twist = np.zeros((4, 4))
+    twist[:3, :3] = np.array([[0.0, -bend, -slope * bend], [bend, 0.0, 0.0], [slope * bend, 0.0, 0.0]])
+    twist[1, 3] = 1.0
+    pose = expm(twist)
+    return pose[:3, 3], Rotation.from_matrix(pose[:3, :3])
+
+
+def gentle_arc() -> dict[str, Any]:
+    """A helix whose end is displaced a little, ribs free at the ends: no rib comes near the bound."""
+    position, frame = helix(-1.5, 0.25)
+    turn = Rotation.from_rotvec([0.05, 0.05, -0.1]) * frame
+    return clamped(position + np.array([0.03, 0.02, 0.01]), turn.as_rotvec(), square_rib=False)
+
+
+@functools.cache
+def _solve(text: str) -> fb.Equilibrium:
+    return fb.solve(fb.Scenario.from_dict(json.loads(text)), strict=True)
+
+
+def solve(tables: dict[str, Any], energy: str, elements: int | None = None) -> fb.Equilibrium:
+    """The equilibrium, solved once per run."""
+    plain = fb.Scenario.from_dict(tables | {"energy": energy}).to_dict()
+    if elements is not None:
+        plain["solver"]["elements"] = elements
+    return _solve(json.dumps(plain, sort_keys=True))
+
+
+def example(name: str) -> dict[str, Any]:
+    """Tables of a shipped scenario."""
+    return fb.load(ROOT / "scenarios" / f"{name}.toml").to_dict()
+
+
+def shell(name: str) -> dict[str, Any]:
+    """A shell reference, see tests/data/README.md."""
+    data: dict[str, Any] = json.loads((SHELLS / f"{name}.json").read_text())
+    return data
+
+
+def on_shell(name: str, energy: str) -> fb.Equilibrium:
+    """The belt of a shell reference."""
+    data = shell(name)
+    turn = Rotation.from_matrix(data["end_rotation_matrix"]).as_rotvec()
+    return solve(clamped(data["end_position"], turn, **{key: data[key] for key in ("length", "width")}), energy)
+
+
+def curve(u: Any, position: Any, tangent: Any) -> CubicHermiteSpline:
+    """The curve through the positions with the tangents given there."""
+    return CubicHermiteSpline(u, np.asarray(position), np.asarray(tangent), axis=0)
+
+
+def shell_peak(name: str) -> Floats:
+    """The shell's point of greatest x on its centre line."""
+    data = shell(name)
+    line = curve(data["u"], data["position"], data["tangent"])
+    fine = line(np.linspace(data["u"][0], data["u"][-1], 20_001))
+    return np.asarray(fine[np.argmax(fine[:, 0])])
+
+
+def distance_to_shell(name: str, energy: str) -> float:
+    """RMS distance of the spine from the shell's centre line, over the shell's 101 points."""
+    data, belt = shell(name), on_shell(name, energy)
+    spine = curve(belt.u, belt.position, belt.frame[:, :, 1])
+    return float(np.sqrt(np.mean(np.sum((spine(data["u"]) - data["position"]) ** 2, axis=1))))
+
+
+class Refinement(NamedTuple):
+    """Changes from each mesh to the next finer one: of the energy, and the largest of the spine at common nodes."""
+
+    elements: tuple[int, ...]
+    energy: Floats
+    position: Floats
+
+
+def refine(tables: dict[str, Any], energy: str, elements: tuple[int, ...]) -> Refinement:
+    """Solves on meshes of which each halves the elements of the one before."""
+    shapes = [solve(tables, energy, count) for count in elements]
+    common = [shape.position[:: count // elements[0]] for shape, count in zip(shapes, elements, strict=True)]
+    return Refinement(
+        elements,
+        np.abs(np.diff([shape.energy for shape in shapes])),
+        np.abs(np.diff(common, axis=0)).max(axis=(1, 2)),
+    )
+
+
+def orders(changes: Floats) -> Floats:
+    """Observed order of convergence from each change to the next."""
+    return np.asarray(np.log2(changes[:-1] / changes[1:]))

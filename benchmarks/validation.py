@@ -1,0 +1,192 @@
+"""Measures the tables of docs/validation.md, save those of ritz.py and random_poses.py."""
+
+from __future__ import annotations
+
+import platform
+import statistics
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.special import ellipe, ellipk
+
+import fishbone as fb
+from cases import (
+    ENERGIES,
+    EXAMPLES,
+    SHEET,
+    clamped,
+    distance_to_shell,
+    example,
+    gentle_arc,
+    helix,
+    orders,
+    refine,
+    shell,
+    shell_peak,
+    solve,
+)
+from tables import number, scientific, table, vector, write
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+REFERENCE = {
+    ("example1", "fishbone"): ("23.504", "(0.3691, 0.2500, 0.0500)"),
+    ("example1", "sadowsky"): ("23.260", "(0.3693, 0.2500, 0.0500)"),
+    ("example1", "wunderlich"): ("23.60", "(0.3684, 0.2500, 0.0500)"),
+    ("example2", "fishbone"): ("18.950", "(0.2936, 0.43, −0.0670)"),
+    ("example2", "sadowsky"): ("17.707", "(0.2947, 0.424, −0.0727)"),
+    ("example2", "wunderlich"): ("18.73", "(0.2898, 0.43, −0.0788)"),
+}
+SHELL_CASES = (
+    "example1_2h",
+    "example1",
+    "example1_h2",
+    "example1_h4",
+    "example1_narrow",
+    "example2_2h",
+    "example2",
+    "example2_h2",
+    "example2_h4",
+    "offset05",
+    "offset10_far",
+    "planar",
+)
+MESHES = (40, 80, 160, 320, 640, 1280)
+REPETITIONS = 31
+
+
+def reference_rows() -> Iterator[list[str]]:
+    """Values computed independently, and ours."""
+    for (name, energy), (value, peak) in REFERENCE.items():
+        row = [f"{name}, `{energy}`", value, peak]
+        for elements in (80, 160):
+            shape = solve(example(name), energy, elements)
+            row += [number(shape.energy, 3), vector(shape.highest_point.position)]
+        yield row
+
+
+def shell_rows() -> Iterator[list[str]]:
+    """Distances from the shell in 1e-3 of its length."""
+    for name in SHELL_CASES:
+        data = shell(name)
+        thickness = f"{data['thickness'] / SHEET:g} × {SHEET:g}"
+        distances = [number(1e3 * distance_to_shell(name, energy), 2) for energy in ENERGIES]
+        yield [f"`{name}`", thickness, *distances]
+
+
+def peak_rows() -> Iterator[list[str]]:
+    """Highest point of example 2."""
+    for factor, name in (("2 ×", "_2h"), ("", ""), ("1/2 ×", "_h2"), ("1/4 ×", "_h4")):
+        title = f"shell, thickness {factor} {SHEET:g}".replace("  ", " ")
+        yield [title, vector(shell_peak(f"example2{name}"), 3)]
+    for energy in reversed(ENERGIES):
+        yield [f"`{energy}`, 160 elements", vector(solve(example("example2"), energy, 160).highest_point.position, 3)]
+    yield ["the source prints", "(0.3, 0.4, −0.01)"]
+
+
+def elastica_rows() -> Iterator[list[str]]:
+    """The planar clamped belt in elliptic integrals: U (2 E/K − 1) = d, height k U/K, thrust (4 K/U)² R_f."""
+    for distance in (0.3, 0.6, 0.9):
+        m = brentq(lambda m, d=distance: 2.0 * ellipe(m) / ellipk(m) - 1.0 - d, 1e-12, 0.9999, xtol=1e-15)
+        first, second = ellipk(m), ellipe(m)
+        exact = [32.0 * first * (second - (1.0 - m) * first), np.sqrt(m) / first, (4.0 * first) ** 2]
+        for elements in (80, 160):
+            shape = solve(clamped((0.0, distance, 0.0)), "wunderlich", elements)
+            found = [shape.energy, shape.highest_point.position[0], -shape.reaction("end").force[1]]
+            errors = [scientific(abs(ours / value - 1.0)) for ours, value in zip(found, exact, strict=True)]
+            yield [number(distance, 1), str(elements), *(number(value, 5) for value in exact), *errors]
+
+
+def cylinder_rows() -> Iterator[list[str]]:
+    """A belt wound on a cylinder of radius 0.5 U, ribs free at the ends: R_f U/(2R²) = 2 at any winding angle."""
+    for angle in (0.0, 0.2, 0.5):
+        position, frame = helix(-(np.cos(angle) ** 2) / 0.5, np.tan(angle))
+        tables = clamped(position, frame.as_rotvec(), square_rib=False)
+        yield [number(angle, 1), *(number(solve(tables, energy).energy, 6) for energy in ENERGIES)]
+
+
+def convergence_rows() -> Iterator[list[str]]:
+    """Changes of the energy from mesh to mesh, with the observed order."""
+    gentle = [refine(gentle_arc(), energy, MESHES) for energy in ("fishbone", "wunderlich")]
+    sharp = [refine(example("example1"), energy, MESHES) for energy in ENERGIES]
+    for i, (coarse, fine) in enumerate(pairwise(MESHES)):
+        cells = []
+        for refinement in (*gentle, *sharp):
+            order = "" if i == 0 else f" ({number(orders(refinement.energy)[i - 1], 1)})"
+            cells.append(scientific(refinement.energy[i]) + order)
+        yield [f"{coarse} → {fine}", *cells]
+
+
+def radius_rows() -> Iterator[list[str]]:
+    """Least bend radius over the width and on the spine, example 1."""
+    for elements in (80, 160, 320, 640, 1280):
+        row = [str(elements)]
+        for energy in ENERGIES:
+            shape = solve(example("example1"), energy, elements)
+            least = shape.least_bend_radius
+            assert least is not None
+            row += [scientific(least.value), number(1.0 / np.abs(shape.curvature).max(), 4)]
+        yield row
+
+
+def timing_rows() -> Iterator[list[str]]:
+    """Median times of the two methods."""
+    for name in EXAMPLES:
+        for energy in ENERGIES:
+            yield _timing(f"{name}, `{energy}`", example(name) | {"energy": energy})
+        tables = example(name)
+        tables["solver"] |= {"method": "ritz"}
+        yield _timing(f"{name}, the source's method", tables)
+
+
+def _timing(title: str, tables: dict[str, Any]) -> list[str]:
+    scenario = fb.Scenario.from_dict(tables)
+    shapes = [fb.solve(scenario) for _ in range(REPETITIONS)]
+    times = [1e3 * shape.solve_time for shape in shapes]
+    return [
+        title,
+        str(shapes[0].iterations),
+        f"{statistics.median(times):.3g}",
+        f"{min(times):.3g}",
+        f"{max(times):.3g}",
+    ]
+
+
+def processor() -> str:
+    """Name of the processor, as far as the system tells."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return platform.machine()
+    return next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), platform.machine())
+
+
+def main() -> None:
+    """Writes all tables."""
+    by_energy = [f"`{energy}`" for energy in ENERGIES]
+    header = ["case", "reference", "highest point [U]", "80 elements", "highest point", "160 elements", "highest point"]
+    write("reference values", table(header, reference_rows()))
+    write("shell", table(["case", "thickness [U]", *by_energy], shell_rows()))
+    write("peak", table(["example 2", "highest point [U]"], peak_rows()))
+    header = ["d [U]", "elements", "energy", "height", "thrust", "error", "error", "error"]
+    write("elastica", table(header, elastica_rows()))
+    write("cylinder", table(["winding angle [rad]", *by_energy], cylinder_rows()))
+    header = [
+        "elements",
+        *(f"gentle arc, `{energy}`" for energy in ("fishbone", "wunderlich")),
+        *(f"example 1, {energy}" for energy in by_energy),
+    ]
+    write("convergence", table(header, convergence_rows()))
+    header = ["elements", *(text for energy in by_energy for text in (energy, "on the spine"))]
+    write("bend radius", table(header, radius_rows()))
+    header = ["case", "iterations", "median [ms]", "least", "most"]
+    machine = f"{processor()}, one thread, {REPETITIONS} solves each, fishbone {fb.__version__}."
+    write("timing", f"{machine}\n\n{table(header, timing_rows())}")
+
+
+if __name__ == "__main__":
+    main()

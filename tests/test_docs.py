@@ -1,0 +1,55 @@
+"""What README.md and docs point at exists."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from conftest import ROOT
+
+PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+LARGEST_PICTURE = 300_000
+
+pages = pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+
+
+def anchors(text):
+    """The headings of a page as links name them."""
+    headings = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@pages
+def test_links_lead_somewhere(page):
+    for target in re.findall(r"\]\((?!https?://)([^)]+)\)", page.read_text()):
+        name, _, anchor = target.partition("#")
+        file = page.parent / name if name else page
+        assert file.is_file(), target
+        assert not anchor or anchor in anchors(file.read_text()), target
+
+
+@pages
+def test_tests_that_are_named_exist(page):
+    sources = "".join(path.read_text() for path in [*ROOT.glob("tests/*.py"), *ROOT.glob("crates/**/*.rs")])
+    for name in re.findall(r"`(test_\w+)`", page.read_text()):
+        assert re.search(rf"\b{name}\b\(", sources), name
+
+
+@pages
+def test_files_that_are_named_exist(page):
+    paths = re.findall(r"`((?:tests|benchmarks|crates|docs|scenarios)/[\w./]+)`", page.read_text())
+    assert not [path for path in paths if not (ROOT / path).exists()]
+
+
+@pages
+def test_lines_fit_the_page(page):
+    lines = page.read_text().splitlines()
+    assert not [line for line in lines if len(line) > 125 and not line.startswith(("|", "!"))]
+
+
+def test_pictures_are_small_and_used():
+    text = "".join(page.read_text() for page in PAGES)
+    for picture in (ROOT / "docs" / "figures").iterdir():
+        assert picture.stat().st_size < LARGEST_PICTURE
+        assert f"figures/{picture.name})" in text
