@@ -78,6 +78,13 @@ class BendRadius(NamedTuple):
     v: float
 
 
+class SpineRadius(NamedTuple):
+    """The least radius of bend on the spine, and where it is."""
+
+    value: float
+    u: float
+
+
 class RibMargin(NamedTuple):
     """How far the ribs are from crossing at an edge, least over u, and where."""
 
@@ -238,9 +245,19 @@ class Equilibrium:
 
     @property
     def least_bend_radius(self) -> BendRadius | None:
-        """The tightest bend of the whole belt, often at an edge; None where nothing bends."""
+        """The tightest bend of the whole belt, often at an edge; None where nothing bends.
+
+        It falls with every refinement of the mesh, because ribs all but meet on an edge where the bend changes sign:
+        compare `least_spine_radius`.
+        """
         least = self._inner.least_bend_radius
         return None if least is None else BendRadius(*least)
+
+    @property
+    def least_spine_radius(self) -> SpineRadius | None:
+        """The tightest bend on the spine; None where nothing bends."""
+        least = self._inner.least_spine_radius
+        return None if least is None else SpineRadius(*least)
 
     @property
     def rib_margin(self) -> RibMargin:

@@ -76,6 +76,9 @@ def _extremes(equilibrium: Equilibrium) -> Iterator[tuple[str, str, str]]:
     least = equilibrium.least_bend_radius
     if least is not None:
         yield "least bend radius", number(least.value), f"at u = {number(least.u)}, v = {number(least.v)}"
+    on_spine = equilibrium.least_spine_radius
+    if on_spine is not None:
+        yield "least bend radius on the spine", number(on_spine.value), f"at u = {number(on_spine.u)}"
     angle = np.degrees(equilibrium.rib_angle)
     largest = int(np.argmax(np.abs(angle)))
     yield "largest rib angle", number(abs(angle[largest])), f"degrees, at u = {number(equilibrium.u[largest])}"

@@ -215,6 +215,13 @@ impl Equilibrium {
         Some((least.value, least.u, least.v))
     }
 
+    /// (value, u), or None where the belt does not bend.
+    #[getter]
+    fn least_spine_radius(&self) -> Option<(f64, f64)> {
+        let least = surface::least_spine_radius(&self.solved.spine)?;
+        Some((least.value, least.u))
+    }
+
     /// (value, u).
     #[getter]
     fn rib_margin(&self) -> (f64, f64) {

@@ -53,8 +53,8 @@ struct Adjoint {
 /// The rotation from the prescribed frame to the present one as modified Rodrigues parameters `4 tan(θ/4) axis`, with
 /// derivatives by the body rotation.
 ///
-/// Like the rotation vector near zero; unlike it and the skew part of the matrix, smooth and of full rank up to and
-/// beyond a half-turn, and zero at no rotation but the prescribed one.
+/// Like the rotation vector near zero, and zero at no other rotation. Unlike the rotation vector and the skew part of
+/// the matrix they have regular derivatives up to and at a half-turn, where the shorter of the two turns changes side.
 #[derive(Debug, Clone, Copy)]
 struct RotationGap {
     scalar: f64,

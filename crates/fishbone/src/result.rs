@@ -39,6 +39,7 @@ pub struct Record<'a> {
     links: [Point; 0],
     highest_point: HighestPoint,
     least_bend_radius: LeastBendRadius,
+    least_spine_radius: LeastSpineRadius,
     rib_margin: RibMargin,
     twist: f64,
     stable: Option<bool>,
@@ -80,6 +81,13 @@ struct LeastBendRadius {
     value: Option<f64>,
     u: Option<f64>,
     v: Option<f64>,
+}
+
+/// All null where the belt does not bend.
+#[derive(Debug, Clone, Serialize)]
+struct LeastSpineRadius {
+    value: Option<f64>,
+    u: Option<f64>,
 }
 
 #[derive(Debug, Clone, Serialize)]
@@ -138,6 +146,7 @@ impl<'a> Record<'a> {
                 position: highest.position.into(),
             },
             least_bend_radius: LeastBendRadius::new(surface::least_bend_radius(spine)),
+            least_spine_radius: LeastSpineRadius::new(surface::least_spine_radius(spine)),
             rib_margin: RibMargin {
                 value: margin.value,
                 u: margin.u,
@@ -191,6 +200,15 @@ impl LeastBendRadius {
             value: radius.map(|radius| radius.value),
             u: radius.map(|radius| radius.u),
             v: radius.map(|radius| radius.v),
+        }
+    }
+}
+
+impl LeastSpineRadius {
+    fn new(radius: Option<surface::SpineRadius>) -> Self {
+        Self {
+            value: radius.map(|radius| radius.value),
+            u: radius.map(|radius| radius.u),
         }
     }
 }

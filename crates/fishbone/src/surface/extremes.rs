@@ -87,6 +87,29 @@ pub struct BendRadius {
     pub v: f64,
 }
 
+/// The tightest bend of the spine.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SpineRadius {
+    /// Its radius.
+    pub value: f64,
+    /// Where it is.
+    pub u: f64,
+}
+
+/// The least radius of bend on the spine, 1/|κ₁| at its nodes; `None` where the belt is flat all over.
+///
+/// Over the whole width the radius falls with every refinement of the mesh, at the inflections of the spine; on the
+/// spine it converges.
+pub fn least_spine_radius(spine: &Spine) -> Option<SpineRadius> {
+    let radius = |(curvature, &u): (f64, &f64)| SpineRadius {
+        value: 1.0 / curvature.abs(),
+        u,
+    };
+    let radii = spine.curvature().into_iter().zip(&spine.u).map(radius);
+    let least = radii.min_by(|a, b| a.value.total_cmp(&b.value));
+    least.filter(|radius| radius.value.is_finite())
+}
+
 /// Samples in each smooth piece from which the tightest bend is refined.
 const SAMPLES: usize = 8;
 
@@ -224,6 +247,18 @@ mod tests {
     use crate::surface::samples::{spine, waves};
     use approx::assert_relative_eq;
     use proptest::prelude::*;
+
+    #[test]
+    fn test_tightest_bend_of_the_spine_is_where_its_curvature_is_largest() {
+        let hump = |u: f64| 3.0 - 8.0 * (u - 0.5).powi(2);
+        let least = least_spine_radius(&spine(1.0, 0.1, 40, hump, |_| 0.5)).unwrap();
+        assert!((least.value - 1.0 / (3.0 * 1.25)).abs() < 1e-12);
+        assert!((least.u - 0.5).abs() < 1e-12);
+        assert_eq!(
+            least_spine_radius(&spine(1.0, 0.1, 40, |_| 0.0, |_| 0.5)),
+            None
+        );
+    }
 
     #[test]
     fn test_highest_point_of_a_circle_is_found_between_nodes() {
