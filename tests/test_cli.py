@@ -1,4 +1,5 @@
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -6,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import fishbone as fb
-from fishbone import cli, examples, files
+from fishbone import cli, examples, files, plot
 
 
 @pytest.fixture
@@ -193,7 +194,7 @@ def test_a_result_is_written_whole_or_not_at_all(run, monkeypatch, example_file)
 
     monkeypatch.setattr(Path, "replace", full)
     code, _, err = run("solve", example_file, "--out", "a.json")
-    assert code == 1
+    assert code == 2
     assert_one_line(err, "a.json", "No space left")
     assert [path.name for path in Path().iterdir()] == ["a.json"]
     assert Path("a.json").read_text("utf-8") == "as before"
@@ -272,3 +273,25 @@ def test_elements_too_long_for_the_width_are_warned_of(run, example):
 def test_default_elements_are_not_warned_of(run, example_file):
     code, _, err = run("solve", example_file)
     assert (code, err) == (0, "")
+
+
+def test_an_output_that_is_no_plain_file_or_leads_nowhere_is_exit_2_before_any_solve(run, monkeypatch, example_file):
+    monkeypatch.setattr(fb, "solve", lambda _: pytest.fail("solved"))
+    os.mkfifo("pipe.json")
+    Path("loop.json").symlink_to("loop.json")
+    Path("dangling.json").symlink_to("nowhere/a.json")
+    for name in ("pipe.json", "loop.json", "dangling.json", "a" * 300 + ".json"):
+        code, out, err = run("solve", example_file, "--out", name)
+        assert (code, out) == (2, ""), name
+        assert_one_line(err)
+
+
+def test_nothing_is_written_where_a_picture_cannot_be_made(run, monkeypatch, example_file):
+    def fail(*_):
+        raise fb.FishboneError("no picture")
+
+    monkeypatch.setattr(plot, "encode", fail)
+    code, _, err = run("solve", example_file, "--out", "a.json", "--figure", "a.png")
+    assert code == 2
+    assert_one_line(err, "no picture")
+    assert list(Path().iterdir()) == []

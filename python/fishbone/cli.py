@@ -26,7 +26,7 @@ class Failure(click.ClickException):
 
 
 class Invalid(Failure):
-    """The input, or the use of the command line, is not valid."""
+    """The input, the use of the command line, or the place to write to is not valid."""
 
     exit_code = 2
 
@@ -107,11 +107,14 @@ def solve(file: Path, *, out: Path | None, figure: Path | None, mesh: Path | Non
     if out is not None and out.resolve() == file.resolve():
         raise Invalid(f"{out}: found the scenario itself, allowed another file")
     equilibrium = fishbone.solve(fishbone.load(file))
+    # All is made before anything is written, so that a failure leaves nothing behind.
+    contents = {}
     if out is not None:
-        _write(out, encode(equilibrium.to_dict()).encode())
+        contents[out] = encode(equilibrium.to_dict()).encode()
     if equilibrium.status == "converged":
-        for path, encode_picture in pictures:
-            _write(path, encode_picture(equilibrium, path.suffix))
+        contents |= {path: encode_picture(equilibrium, path.suffix) for path, encode_picture in pictures}
+    for path, content in contents.items():
+        _write(path, content)
     _print(equilibrium, file, as_json=as_json)
 
 
@@ -140,7 +143,7 @@ def _write(path: Path, content: bytes) -> None:
     try:
         write_whole(path, content)
     except OSError as error:
-        raise Failure(f"{path}: not written: {error.strerror}") from error
+        raise Invalid(f"{path}: not written: {error.strerror}") from error
 
 
 def _print(equilibrium: Equilibrium, file: Path, *, as_json: bool) -> None:

@@ -135,7 +135,12 @@ class Equilibrium:
     @property
     def energy_model(self) -> str:
         """The energy minimised: "fishbone", "sadowsky" or "wunderlich"."""
-        return str(self.to_dict()["energy_model"])
+        return self._inner.energy_model
+
+    @property
+    def twist(self) -> float:
+        """Total torsion ∫ ω_η du [rad]: whole extra turns of the end show here and nowhere else."""
+        return self._inner.twist
 
     @property
     def stable(self) -> bool | None:

@@ -11,13 +11,19 @@ if TYPE_CHECKING:
 
 def check_writable(path: Path, suffixes: tuple[str, ...]) -> str | None:
     """What stands in the way of writing a file here, "found …, allowed …"; None where nothing does."""
-    folder = path.parent
     if path.suffix.lower() not in suffixes:
         return f"found {path.suffix or 'no suffix'}, allowed {', '.join(suffixes)}"
+    try:
+        # A link stays a link: what it points to is what is replaced.
+        target = path.resolve()
+        exists = target.exists()
+    except (OSError, RuntimeError) as error:
+        return f"found a name that leads nowhere ({error}), allowed a file that can be written"
+    folder = target.parent
     if not folder.is_dir():
         return f"found no folder {folder}, allowed an existing one"
-    if path.is_dir():
-        return f"found the folder {path}, allowed a file"
+    if exists and not target.is_file():
+        return f"found {path}, which is no plain file, allowed a file"
     if not os.access(folder, os.W_OK | os.X_OK):
         return f"found the folder {folder} read-only, allowed one to write in"
     return None

@@ -97,7 +97,7 @@ def _vectors(equilibrium: Equilibrium) -> Table:
 def _named_vectors(equilibrium: Equilibrium) -> Iterable[tuple[str, Floats]]:
     u, position = equilibrium.highest_point
     yield f"highest point, u = {number(u)}", position
-    for index, support in enumerate(equilibrium.to_dict()["supports"]):
+    for index, support in enumerate(equilibrium.scenario.to_dict()["supports"]):
         place = _place(support["at"], equilibrium.u)
         force, moment = equilibrium.reaction(index)
         yield f"force on the belt, {place}", force

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     Table = Mapping[str, Any]
 
-MAX_BYTES = 16 * 1024 * 1024
+MAX_BYTES = 16_000_000
 """A scenario file larger than this is not one: refused unread."""
 
 _PARSERS = {".toml": _core.Scenario.from_toml, ".json": _core.Scenario.from_json}
@@ -119,7 +119,9 @@ def _read(path: Path) -> str:
     with path.open("rb") as file:
         content = file.read(MAX_BYTES + 1)
     if len(content) > MAX_BYTES:
-        raise InvalidScenario(f"file size: found over {MAX_BYTES >> 20} MB, allowed up to {MAX_BYTES >> 20} MB")
+        raise InvalidScenario(
+            f"file size: found over {MAX_BYTES // 1_000_000} MB, allowed up to {MAX_BYTES // 1_000_000} MB"
+        )
     if not content.strip():
         raise InvalidScenario("file: found nothing in it, allowed a scenario")
     return content.decode("utf-8-sig")

@@ -92,6 +92,17 @@ impl Equilibrium {
     }
 
     #[getter]
+    fn energy_model(&self) -> &'static str {
+        self.solved.scenario.energy.name()
+    }
+
+    /// Units: rad.
+    #[getter]
+    fn twist(&self) -> f64 {
+        self.solved.spine.twist()
+    }
+
+    #[getter]
     fn stable(&self) -> Option<bool> {
         self.solved.stable
     }

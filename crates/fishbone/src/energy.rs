@@ -30,6 +30,15 @@ pub struct Density {
 }
 
 impl EnergyModel {
+    /// Its name in scenarios and results.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Fishbone => "fishbone",
+            Self::Sadowsky => "sadowsky",
+            Self::Wunderlich => "wunderlich",
+        }
+    }
+
     /// Energy per unit length at unit rigidity, with y = sV/2 the share of the rib bound in use, |y| < 1; the numbers
     /// may carry derivatives.
     ///

@@ -2,9 +2,10 @@
 
 mod intrinsic;
 mod ritz;
+mod search;
 
 use crate::belt::Belt;
-use crate::scenario::{Method, Scenario};
+use crate::scenario::{Method, Scenario, SupportSpec};
 use crate::solver::Residuals;
 use crate::spine::Spine;
 use nalgebra::Vector3;
@@ -103,5 +104,73 @@ pub fn solve(scenario: &Scenario, proceed: &mut dyn FnMut() -> ControlFlow<()>) 
     match scenario.solver.method {
         Method::Intrinsic => intrinsic::solve(scenario, &belt, proceed),
         Method::Ritz => ritz::solve(scenario, &belt, proceed),
+    }
+}
+
+/// Two supports in a row, and how far they are apart along the axes that both hold.
+struct Span {
+    u: [f64; 2],
+    distance: f64,
+    /// What rounding may do to the distance.
+    rounding: f64,
+}
+
+impl Span {
+    fn between(pair: &[SupportSpec], length: f64) -> Self {
+        let [x, x_next] = [0, 1].map(|i| pair[i].components());
+        let held = (0..3).filter_map(|i| x[i].zip(x_next[i]));
+        let (square, size) = held.fold((0.0, 0.0), |(square, size), (a, b)| {
+            (
+                square + (b - a) * (b - a),
+                f64::max(size, a.abs().max(b.abs())),
+            )
+        });
+        Self {
+            u: [0, 1].map(|i| pair[i].at.arc_length(length)),
+            distance: f64::sqrt(square),
+            rounding: 1e-12 * length + 4.0 * f64::EPSILON * size,
+        }
+    }
+
+    /// By how much the distance exceeds the belt in between.
+    fn excess(&self) -> f64 {
+        self.distance - (self.u[1] - self.u[0])
+    }
+}
+
+/// Says by how much two supports are too far apart for the belt between them, where they are.
+fn excess_distance(scenario: &Scenario, length: f64) -> Option<String> {
+    let mut spans = scenario
+        .supports
+        .windows(2)
+        .map(|pair| Span::between(pair, length));
+    let span = spans.find(|span| span.excess() > span.rounding)?;
+    Some(format!(
+        "supports at u = {} and u = {} are {} apart, {} more than the belt between them ({}); move them closer",
+        number(span.u[0]),
+        number(span.u[1]),
+        number(span.distance),
+        number(span.excess()),
+        number(span.u[1] - span.u[0])
+    ))
+}
+
+/// Whether two supports leave the belt between them so little slack that its reactions are not determined.
+fn is_taut(scenario: &Scenario, length: f64) -> bool {
+    const SLACK: f64 = 1e-6;
+    let mut spans = scenario
+        .supports
+        .windows(2)
+        .map(|pair| Span::between(pair, length));
+    spans.any(|span| span.excess() > -SLACK * (span.u[1] - span.u[0]))
+}
+
+/// A number for people, six decimals or the exponent that it needs.
+fn number(value: f64) -> String {
+    if value == 0.0 || (1e-3..1e6).contains(&value.abs()) {
+        let text = format!("{value:.6}");
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        format!("{value:.6e}")
     }
 }

@@ -58,12 +58,8 @@ pub(crate) fn guess(program: &BeltProgram, bulge: &Vector3<f64>) -> BeltPoint {
     let (start, end) = (at(0), at(last));
     let frame = start_frame(start, end, bulge);
     let arch = fit_arch(&frame, start, end, bulge);
-    let mut u = 0.0;
-    let mut fields = vec![Vector2::new(arch.bend(0.0), 0.0)];
-    for element in &program.elements {
-        u += element.length;
-        fields.push(Vector2::new(arch.bend(u), 0.0));
-    }
+    let field = |u: f64| Vector2::new(arch.bend(u), 0.0);
+    let fields = program.nodes().into_iter().map(field).collect();
     let tilt = exp(&Vector3::new(0.0, 0.0, arch.angle(0.0)));
     let mut point = BeltPoint {
         fields,
@@ -90,15 +86,10 @@ pub(crate) fn disturb(program: &BeltProgram, point: &BeltPoint, share: f64) -> B
         .fold(f64::INFINITY, f64::min);
     let twist = share * (bound / steepest).min(1.0);
     let mut disturbed = point.clone();
-    let mut u = 0.0;
-    for (k, fields) in disturbed.fields.iter_mut().enumerate() {
+    for (fields, u) in disturbed.fields.iter_mut().zip(program.nodes()) {
         let (once, twice) = ((PI * u).sin(), (2.0 * PI * u).sin());
         *fields *= 1.0 - share;
         *fields += Vector2::new(share * twice, twist * (once + 0.7 * twice));
-        u += program
-            .elements
-            .get(k)
-            .map_or(0.0, |element| element.length);
     }
     program.carry(&mut disturbed);
     disturbed
@@ -171,10 +162,11 @@ fn fit_arch(
     let anchored = start.is_some_and(|s| s.frame.is_some());
     arch(least(HIGHEST, |height| {
         let reach = arch(height).reach();
+        // Not squared: on a nearly taut belt the miss is itself a square of the height.
         if anchored {
-            (Vector3::new(reach.x, reach.y, 0.0) - local).norm_squared()
+            (Vector3::new(reach.x, reach.y, 0.0) - local).norm()
         } else {
-            (reach.norm() - chord.norm()).powi(2)
+            (reach.norm() - chord.norm()).abs()
         }
     }))
 }
@@ -182,7 +174,7 @@ fn fit_arch(
 /// Where a function of [0, `most`] is least: the best of a grid, then a ternary search around it.
 fn least(most: f64, f: impl Fn(f64) -> f64) -> f64 {
     const GRID: usize = 24;
-    const NARROWINGS: usize = 40;
+    const NARROWINGS: usize = 60;
     let step = most / GRID as f64;
     let (mut best, mut value) = (0.0, f64::INFINITY);
     for k in 0..=GRID {

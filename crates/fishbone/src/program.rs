@@ -167,6 +167,18 @@ impl BeltProgram {
         Vector4::new(a[0], a[1], b[0], b[1])
     }
 
+    /// Arc length of every node, in U.
+    pub fn nodes(&self) -> Vec<f64> {
+        let mut u = 0.0;
+        let mut nodes = vec![u];
+        for element in &self.elements {
+            u += element.length;
+            nodes.push(u);
+        }
+        nodes[self.elements.len()] = 1.0;
+        nodes
+    }
+
     /// Bending energy of a shape.
     pub fn energy(&self, fields: &[Vector2<f64>]) -> f64 {
         self.elements

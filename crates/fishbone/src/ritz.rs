@@ -162,8 +162,8 @@ pub struct Solution {
     pub iterations: usize,
     /// Whether the last inner minimisation met its gradient tolerance. It says nothing of the violation.
     pub stationary: bool,
-    /// Whether the caller broke the solve off.
-    pub interrupted: bool,
+    /// Whether the caller, or the budget of iterations, cut the solve short.
+    pub cut_short: bool,
 }
 
 impl Solution {
@@ -221,6 +221,9 @@ const CLAMP_UPDATES: usize = 50;
 /// The penalty from which the automatic start climbs.
 const SOFTEST_PENALTY: f64 = 0.1;
 
+/// Iterations over all stages and updates after which a solve is cut short.
+const BUDGET: usize = 10_000;
+
 /// Solves from the automatic start, with the penalty climbing to the one asked for by decades.
 ///
 /// Thrown straight at a high penalty the method locks near wherever it starts; climbing, it locks later.
@@ -231,6 +234,15 @@ pub fn solve(
     options: &Options,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Solution {
+    let mut left = BUDGET;
+    let proceed = &mut || {
+        left = left.saturating_sub(1);
+        if left == 0 {
+            ControlFlow::Break(())
+        } else {
+            proceed()
+        }
+    };
     let (mut coefficients, mut iterations) = (start(problem, options), 0);
     for penalty in climb(options.penalty) {
         let stage = Options {
@@ -240,7 +252,7 @@ pub fn solve(
         };
         let solution = solve_from(problem, &stage, &coefficients, proceed);
         iterations += solution.iterations;
-        if solution.interrupted {
+        if solution.cut_short {
             return Solution {
                 iterations,
                 ..solution
@@ -342,7 +354,7 @@ fn solution(problem: &Problem, options: &Options, updates: usize, minimum: Minim
         stationarity: minimum.gradient,
         iterations: minimum.iterations,
         stationary: minimum.stationary,
-        interrupted: minimum.interrupted,
+        cut_short: minimum.interrupted,
     }
 }
 
@@ -624,7 +636,7 @@ mod tests {
             }
         };
         let solution = solve(&problem, &Options::default(), &mut proceed);
-        assert!(solution.interrupted && !solution.stationary);
+        assert!(solution.cut_short && !solution.stationary);
         assert_eq!((solution.iterations, solution.updates), (5, 0));
     }
 

@@ -123,3 +123,69 @@ fn test_caller_ends_a_solve() {
         (Status::NotConverged, 0)
     );
 }
+
+#[test]
+fn test_nearly_taut_belts_are_warned_of_and_just_fitting_ones_are_solved() {
+    let text = include_str!("../../../scenarios/planar.toml");
+    let at = |distance: f64| {
+        solved(&text.replace("[0.0, 0.6, 0.0]", &format!("[0.0, {distance}, 0.0]")))
+    };
+    let fits = at(0.9999);
+    assert_minimum(&fits);
+    assert!(fits.warnings.is_empty());
+    // Small amplitude: E = 4π² (1 − d), and the force is Euler's load.
+    let load = 4.0 * std::f64::consts::PI.powi(2);
+    assert_near(fits.energy, load * 1e-4, 1e-6 * load);
+    assert_near(fits.reactions[1].wrench.force.y, -load, 1e-3 * load);
+    let taut = at(1.0);
+    assert_eq!(taut.status, Status::Converged);
+    assert!(taut.warnings[0].contains("slack"), "{:?}", taut.warnings);
+    assert!(taut.reactions[1].wrench.force.norm() < 1e-6);
+}
+
+#[test]
+fn test_belt_that_may_slide_along_itself_is_not_called_a_saddle() {
+    let text = include_str!("../../../scenarios/planar.toml");
+    let closed = solved(&text.replace("[0.0, 0.6, 0.0]", "[0.0, 0.0, 0.0]"));
+    assert_eq!((closed.status, closed.stable), (Status::Converged, None));
+}
+
+#[test]
+fn test_finer_mesh_shows_the_same_shape() {
+    // This belt has another minimum at a quarter of the energy.
+    let text = include_str!("../../../scenarios/planar.toml").replace(
+        "position = [0.0, 0.6, 0.0]\nrotation = [0.0, 0.0, 0.0]",
+        "position = [0.5, -0.06, -0.02]\nrotation = [0.37, -0.55, 0.11]",
+    );
+    let on = |elements: usize| solved(&format!("{text}\n[solver]\nelements = {elements}\n"));
+    let (coarse, fine) = (on(80), on(320));
+    assert_minimum(&coarse);
+    assert_minimum(&fine);
+    assert_near(fine.energy / coarse.energy, 1.0, 0.01);
+}
+
+#[test]
+fn test_caller_ends_a_solve_by_saying_so_once() {
+    // Hardly to be reached, so that the search passes through its restoration.
+    let text = include_str!("../../../scenarios/planar.toml")
+        .replace("[0.0, 0.6, 0.0]", "[0.0, 0.7, 0.7]");
+    let scenario = Scenario::from_toml(&text).unwrap();
+    for last in 1..40 {
+        let mut asked = 0;
+        let equilibrium = solve(&scenario, &mut || {
+            asked += 1;
+            if asked == last {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        });
+        assert_eq!(equilibrium.status, Status::NotConverged);
+        assert!(
+            equilibrium.message.contains("interrupted") || asked < last,
+            "{}",
+            equilibrium.message
+        );
+        assert!(asked <= last);
+    }
+}

@@ -1,21 +1,15 @@
 //! The intrinsic method: the interior-point search in the two fields bend and rib slope.
 
-use super::{Equilibrium, Reaction, Status, Units, Wrench};
+use super::search::Search;
+use super::{Equilibrium, Reaction, Status, Units, Wrench, excess_distance, is_taut};
 use crate::belt::Belt;
-use crate::guess::{disturb, guess};
 use crate::lie::Pose;
 use crate::program::{BeltPoint, BeltProgram, NodeSupport};
 use crate::scenario::{Scenario, SupportSpec};
-use crate::solver::{self, Curvature, Outcome, Settings, Solution};
+use crate::solver::{Curvature, Outcome, Solution};
 use crate::spine::Spine;
 use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 use std::ops::ControlFlow;
-
-/// First barrier: so high that the search first finds the supports, then lowers the energy.
-const BARRIER: f64 = 10.0;
-const ITERATIONS: usize = 500;
-/// By how much the start is disturbed where the plain one leads to no minimum.
-const DISTURBANCES: [f64; 3] = [0.05, 0.2, 0.4];
 
 /// Finds a minimum of the energy in the two fields.
 pub(super) fn solve(
@@ -24,38 +18,29 @@ pub(super) fn solve(
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Equilibrium {
     let units = Units::of(belt);
-    let program = program(scenario, belt);
-    let start = guess(&program, &Vector3::from(scenario.solver.bulge));
-    let settings = Settings {
+    let mesh = |count| program(scenario, belt, count);
+    let program = mesh(scenario.elements());
+    let search = Search {
+        bulge: Vector3::from(scenario.solver.bulge),
         tolerance: scenario.solver.tolerance,
-        iterations: ITERATIONS,
-        barrier: BARRIER,
     };
-    let excess = excess_distance(scenario, belt.length());
+    let excess = excess_distance(scenario, units.length);
     let solution = match excess {
-        Some(_) => search(
-            &program,
-            &Settings {
-                iterations: 0,
-                ..settings
-            },
-            &start,
-            proceed,
-        ),
-        None => search(&program, &settings, &start, proceed),
+        Some(_) => search.start(&program),
+        None => search.run(&mesh, &program, scenario.default_elements(), proceed),
     };
     let (status, message) = match excess {
         Some(message) => (Status::Infeasible, message),
-        None => judge(&solution, settings.tolerance),
+        None => judge(&solution, search.tolerance),
     };
     let energy = solution.values.objective * units.energy;
-    let spine = units.spine(&program, &solution.point, belt.width);
+    let spine = units.spine(&program, &solution.point, belt.width, &origin(scenario));
     let internal = program.internal(&solution.point, &solution.multipliers);
     let stable = stable(status, solution.curvature);
     Equilibrium {
         status,
         message,
-        warnings: warnings(&program, stable),
+        warnings: warnings(&program, is_taut(scenario, units.length), stable),
         energy,
         elastic_energy: energy,
         torsion: spine.torsion(),
@@ -69,14 +54,15 @@ pub(super) fn solve(
     }
 }
 
-/// The programme of a scenario, lengths in U and energy in mean R_f/U.
-fn program(scenario: &Scenario, belt: &Belt) -> BeltProgram {
-    let elements = belt.elements(scenario.elements());
+/// The programme of a scenario with so many elements, lengths in U and energy in mean R_f/U.
+fn program(scenario: &Scenario, belt: &Belt, count: usize) -> BeltProgram {
+    let elements = belt.elements(count);
     let last = elements.len();
+    let origin = origin(scenario);
     let mut supports: Vec<NodeSupport> = scenario
         .supports
         .iter()
-        .map(|support| node_support(support, belt.length(), last))
+        .map(|support| node_support(support, &origin, belt.length(), last))
         .collect();
     if supports.is_empty() {
         supports.push(NodeSupport {
@@ -93,92 +79,27 @@ fn program(scenario: &Scenario, belt: &Belt) -> BeltProgram {
     }
 }
 
+/// Where the programme has its origin, so that a belt far from the world's loses no digits: at the first support.
+fn origin(scenario: &Scenario) -> Vector3<f64> {
+    let first = |i: usize| scenario.supports.iter().find_map(|s| s.components()[i]);
+    Vector3::from([0, 1, 2].map(|i| first(i).unwrap_or(0.0)))
+}
+
 /// The conditions of a support at one of the two ends.
-fn node_support(support: &SupportSpec, length: f64, last: usize) -> NodeSupport {
+fn node_support(
+    support: &SupportSpec,
+    origin: &Vector3<f64>,
+    length: f64,
+    last: usize,
+) -> NodeSupport {
     let at_start = support.at.arc_length(length) < 0.5 * length;
     let quaternion =
         |frame| UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(frame));
     NodeSupport {
         node: if at_start { 0 } else { last },
-        position: support.components().map(|held| Some(held? / length)),
+        position: [0, 1, 2].map(|i| Some((support.components()[i]? - origin[i]) / length)),
         frame: support.frame().map(quaternion),
         square_rib: support.is_square_rib(length),
-    }
-}
-
-/// Arc length of every node, in U.
-fn nodes(program: &BeltProgram) -> Vec<f64> {
-    let mut u = 0.0;
-    let mut nodes = vec![u];
-    for element in &program.elements {
-        u += element.length;
-        nodes.push(u);
-    }
-    nodes[program.elements.len()] = 1.0;
-    nodes
-}
-
-/// Says by how much two supports are too far apart for the belt between them, where they are.
-fn excess_distance(scenario: &Scenario, length: f64) -> Option<String> {
-    const ROUNDING: f64 = 1e-12;
-    let held: Vec<(f64, Vector3<f64>)> = scenario
-        .supports
-        .iter()
-        .filter_map(|s| Some((s.at.arc_length(length), s.point()?)))
-        .collect();
-    held.windows(2).find_map(|pair| {
-        let ((u, x), (u_next, x_next)) = (pair[0], pair[1]);
-        let (distance, between) = ((x_next - x).norm(), u_next - u);
-        (distance > between * (1.0 + ROUNDING)).then(|| {
-            format!(
-                "supports at u = {u} and u = {u_next} are {distance:.6} apart, {:.6} more than the belt between them \
-                 ({between}); move them closer",
-                distance - between
-            )
-        })
-    })
-}
-
-/// Searches from the start, then from disturbed ones, until a minimum is found; the best that was found otherwise.
-fn search(
-    program: &BeltProgram,
-    settings: &Settings,
-    start: &BeltPoint,
-    proceed: &mut dyn FnMut() -> ControlFlow<()>,
-) -> Solution<BeltPoint> {
-    let mut best = solver::minimise(program, settings, start.clone(), proceed);
-    for share in DISTURBANCES {
-        let done = match best.outcome {
-            Outcome::Interrupted => true,
-            Outcome::Converged => best.curvature != Curvature::Negative,
-            _ => settings.iterations == 0,
-        };
-        if done {
-            break;
-        }
-        let from = if best.outcome == Outcome::Converged {
-            &best.point
-        } else {
-            start
-        };
-        let from = disturb(program, from, share);
-        let mut next = solver::minimise(program, settings, from, proceed);
-        next.iterations += best.iterations;
-        if rank(&next) >= rank(&best) {
-            best = next;
-        } else {
-            best.iterations = next.iterations;
-        }
-    }
-    best
-}
-
-/// The better of two ends has the higher rank: a minimum, another equilibrium, anything else.
-fn rank(solution: &Solution<BeltPoint>) -> u8 {
-    match (solution.outcome, solution.curvature) {
-        (Outcome::Converged, Curvature::Positive | Curvature::Marginal) => 2,
-        (Outcome::Converged, Curvature::Negative) => 1,
-        _ => 0,
     }
 }
 
@@ -205,6 +126,13 @@ fn judge(solution: &Solution<BeltPoint>, tolerance: f64) -> (Status, String) {
                  angles in rad); move the supports closer, try another solver.bulge or more solver.elements"
             ),
         ),
+        Outcome::Stalled => (
+            Status::NotConverged,
+            format!(
+                "no step improves the shape any more, largest residual {largest:.1e} after {iterations} iterations; try \
+                 a tolerance above it or another solver.elements"
+            ),
+        ),
         Outcome::Unbounded => (
             Status::NotConverged,
             format!(
@@ -219,7 +147,7 @@ fn judge(solution: &Solution<BeltPoint>, tolerance: f64) -> (Status, String) {
     }
 }
 
-fn warnings(program: &BeltProgram, stable: Option<bool>) -> Vec<String> {
+fn warnings(program: &BeltProgram, taut: bool, stable: Option<bool>) -> Vec<String> {
     // Strong twist makes facets of the scale of V, which longer elements cannot resolve.
     const SAFE: f64 = 8.0;
     let shares = program
@@ -235,6 +163,9 @@ fn warnings(program: &BeltProgram, stable: Option<bool>) -> Vec<String> {
                 "elements of {longest:.2} V may settle on a false level: V/8 is safe, so raise solver.elements to {:.0}",
                 (SAFE * longest * program.elements.len() as f64).ceil()
             )
+        }),
+        taut.then(|| {
+            "the supports leave the belt less than 1e-6 of slack: the reactions are not determined".to_owned()
         }),
         saddle.then(|| "the equilibrium is no minimum of the energy: try another solver.bulge".to_owned()),
     ]
@@ -277,12 +208,18 @@ impl Units {
         }
     }
 
-    fn spine(&self, program: &BeltProgram, point: &BeltPoint, width: f64) -> Spine {
+    fn spine(
+        &self,
+        program: &BeltProgram,
+        point: &BeltPoint,
+        width: f64,
+        origin: &Vector3<f64>,
+    ) -> Spine {
         let pose = |pose: &Pose| Pose {
             frame: pose.frame,
-            position: pose.position * self.length,
+            position: origin + pose.position * self.length,
         };
-        let nodes = nodes(program);
+        let nodes = program.nodes();
         Spine {
             width,
             u: nodes.iter().map(|u| u * self.length).collect(),

@@ -1,6 +1,6 @@
 //! The source's own method, in the terms of an equilibrium.
 
-use super::{Equilibrium, Status, Units};
+use super::{Equilibrium, Status, Units, excess_distance};
 use crate::belt::Belt;
 use crate::lie::{Pose, exp, log};
 use crate::ritz::{self, Options, Orientation, Problem, Side, Solution};
@@ -71,10 +71,14 @@ fn report(scenario: &Scenario, belt: &Belt, start: &Pose, solution: &Solution) -
     };
     let rate = |i: usize| u.iter().map(move |u| solution.rates(*u)[i] / units.length);
     let energy = solution.energy * units.energy;
+    let (status, message) = match excess_distance(scenario, units.length) {
+        Some(message) => (Status::Infeasible, message),
+        None => (Status::NotConverged, message(solution)),
+    };
     Equilibrium {
         scenario: scenario.clone(),
-        status: Status::NotConverged,
-        message: message(solution),
+        status,
+        message,
         warnings: Vec::new(),
         energy,
         elastic_energy: energy,
@@ -100,15 +104,15 @@ fn report(scenario: &Scenario, belt: &Belt, start: &Pose, solution: &Solution) -
 
 fn message(solution: &Solution) -> String {
     let (points, along) = (&solution.violation, &solution.violation_along);
-    let ended = if solution.interrupted {
-        "interrupted"
+    let ended = if solution.cut_short {
+        "cut short"
     } else {
         "ended"
     };
     format!(
-        "the source's equations are over-determined and cannot all be met: {ended} with Eq. (25) missed by {:.2e} and \
-         Eq. (32) by {:.2e} rad/U at the collocation points, by {:.2e} and {:.2e} between them; for an equilibrium use \
-         solver.method = \"intrinsic\"",
+        "the source's method does not solve its own equations, of which there are more than unknowns: {ended} with Eq. \
+         (25) missed by {:.2e} and Eq. (32) by {:.2e} rad/U at the collocation points, by {:.2e} and {:.2e} between \
+         them; for an equilibrium use solver.method = \"intrinsic\"",
         points.geodesic, points.rib_slope, along.geodesic, along.rib_slope
     )
 }

@@ -10,10 +10,11 @@ mod untagged;
 mod validate;
 
 pub use crate::energy::EnergyModel;
+use crate::lie::{self, Euler};
 use crate::ritz::Options;
 pub use parse::{LONGEST_JSON, LONGEST_TOML};
 
-use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -313,7 +314,7 @@ pub struct SolverSpec {
     #[schemars(range(min = 4, max = 100_000))]
     pub elements: Option<usize>,
     /// Max-norm of stationarity, constraints and complementarity, with lengths in U and energy in mean R_f/U.
-    #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
+    #[schemars(range(min = 1e-13, max = 1e-2))]
     pub tolerance: f64,
     /// Which of mirror twins to take: the one that bulges along this direction, world axes. Shapes: (3,).
     pub bulge: [f64; 3],
@@ -340,16 +341,16 @@ impl Default for SolverSpec {
 #[serde(deny_unknown_fields, default)]
 pub struct RitzSpec {
     /// Number of basis functions of each angle: 1, u, and pairs of a sine and a cosine, Eq. (41)–(43); even.
-    #[schemars(range(min = 6, max = 200), extend("multipleOf" = 2))]
+    #[schemars(range(min = 6, max = 40), extend("multipleOf" = 2))]
     pub basis: usize,
     /// Number of points where Eq. (25) and (32) are collocated.
-    #[schemars(range(min = 2, max = 10_000))]
+    #[schemars(range(min = 2, max = 500))]
     pub points: usize,
     /// Penalty on the collocated constraints; the default is that at which the source's printed shapes come out.
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[schemars(range(min = 1e-6, max = 1e12))]
     pub penalty: f64,
     /// Number of updates of the multipliers; 0 keeps to the penalty alone.
-    #[schemars(range(max = 10_000))]
+    #[schemars(range(max = 1000))]
     pub updates: usize,
 }
 
@@ -377,7 +378,12 @@ impl Scenario {
     pub fn elements(&self) -> usize {
         self.solver
             .elements
-            .unwrap_or_else(|| default_elements(self.belt.length(), self.belt.width))
+            .unwrap_or_else(|| self.default_elements())
+    }
+
+    /// Number of elements where the scenario names none.
+    pub fn default_elements(&self) -> usize {
+        default_elements(self.belt.length(), self.belt.width)
     }
 }
 
@@ -503,17 +509,17 @@ impl SupportSpec {
     /// Frame R = [ξ η ζ] that the support holds; `None` where the orientation is free.
     ///
     /// Shapes: (3, 3), columns ξ, η, ζ.
-    /// Source: Eq. (1) for `euler`, written as Rz(φ) Ry(θ) Rz(ψ).
+    /// Source: Eq. (1) for `euler`.
     pub fn frame(&self) -> Option<Matrix3<f64>> {
-        let rotation = if let Some(vector) = self.rotation {
-            Rotation3::from_scaled_axis(Vector3::from(vector))
-        } else if let Some([phi, theta, psi]) = self.euler {
-            about_z(phi) * Rotation3::from_axis_angle(&Vector3::y_axis(), theta) * about_z(psi)
-        } else {
-            let [w, x, y, z] = self.quaternion?;
-            UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)).to_rotation_matrix()
-        };
-        Some(rotation.into_inner())
+        if let Some(vector) = self.rotation {
+            return Some(lie::exp(&Vector3::from(vector)));
+        }
+        if let Some([phi, theta, psi]) = self.euler {
+            return Some(lie::frame_from_euler(&Euler { phi, theta, psi }));
+        }
+        let [w, x, y, z] = self.quaternion?;
+        let quaternion = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
+        Some(quaternion.to_rotation_matrix().into_inner())
     }
 
     /// Components of the position that the support holds. Units: m.
@@ -541,10 +547,6 @@ impl SupportSpec {
     fn has_orientation(&self) -> bool {
         self.rotation.is_some() || self.euler.is_some() || self.quaternion.is_some()
     }
-}
-
-fn about_z(angle: f64) -> Rotation3<f64> {
-    Rotation3::from_axis_angle(&Vector3::z_axis(), angle)
 }
 
 impl Component {

@@ -14,10 +14,20 @@ use std::ops::RangeInclusive;
 /// How far the norm of a quaternion may be off 1.
 const QUATERNION_TOLERANCE: f64 = 1e-6;
 
+/// Lengths, rigidities and forces outside this range would overflow or vanish in what is computed from them.
+const MAGNITUDES: RangeInclusive<f64> = 1e-100..=1e100;
+/// Positions farther away than this, in U, leave too few digits for the shape.
+const FARTHEST: f64 = 1e6;
+/// Rotations by more than this, in rad, leave too few digits for the direction.
+const LARGEST_ANGLE: f64 = 1e6;
+/// Finer tolerances are below rounding, coarser ones no equilibrium.
+const TOLERANCES: RangeInclusive<f64> = 1e-13..=1e-2;
+
 const ELEMENTS: RangeInclusive<usize> = 4..=100_000;
-const RITZ_BASIS: RangeInclusive<usize> = 6..=200;
-const RITZ_POINTS: RangeInclusive<usize> = 2..=10_000;
-const RITZ_UPDATES: RangeInclusive<usize> = 0..=10_000;
+const RITZ_BASIS: RangeInclusive<usize> = 6..=40;
+const RITZ_POINTS: RangeInclusive<usize> = 2..=500;
+const RITZ_PENALTIES: RangeInclusive<f64> = 1e-6..=1e12;
+const RITZ_UPDATES: RangeInclusive<usize> = 0..=1000;
 
 const ORIENTATIONS: &str = "one of rotation, euler, quaternion";
 
@@ -79,6 +89,17 @@ impl Scenario {
             ELEMENTS.contains(&elements),
             format_args!("solver.elements"),
             || (format!("{elements}{source}"), between(&ELEMENTS)),
+        )?;
+        let segments = self.belt.segments.len();
+        require(
+            segments <= elements,
+            format_args!("solver.elements"),
+            || {
+                (
+                    format!("{elements}{source} for {segments} segments"),
+                    "at least one a segment",
+                )
+            },
         )
     }
 
@@ -98,7 +119,7 @@ impl Scenario {
 
 impl BeltSpec {
     fn check(&self) -> Check {
-        positive(format_args!("belt.width"), self.width)?;
+        measurable(format_args!("belt.width"), self.width)?;
         if let Some(poisson) = self.poisson {
             check_poisson(format_args!("belt.poisson"), poisson)?;
         }
@@ -132,17 +153,28 @@ impl BeltSpec {
             segment.check(i, self.width)?;
         }
         let length = self.length();
-        require(is_positive(length), field, || {
+        require(MAGNITUDES.contains(&length), field, || {
             (
                 format!("a total length of {}", number(length)),
-                "of a positive finite length",
+                format!("of a length {}", span(&MAGNITUDES)),
             )
-        })
+        })?;
+        for (i, segment) in self.segments.iter().enumerate() {
+            let share = segment.length() / length;
+            let long = share == 0.0 || share > SAME_PLACE;
+            require(long, format_args!("belt.segments[{i}].length"), || {
+                (
+                    number(segment.length()),
+                    format!("more than {SAME_PLACE:e} of the belt's length"),
+                )
+            })?;
+        }
+        Ok(())
     }
 
     fn check_rigidity(&self) -> Check {
         if let Some(rigidity) = self.rigidity {
-            positive(format_args!("belt.rigidity"), rigidity)?;
+            measurable(format_args!("belt.rigidity"), rigidity)?;
         }
         if let Some(material) = &self.material {
             material.check()?;
@@ -150,12 +182,16 @@ impl BeltSpec {
         self.check_layers()?;
         self.check_rigidity_sources()?;
         let derived = self.own_rigidity().unwrap_or(1.0);
-        require(is_positive(derived), format_args!("belt.material"), || {
-            (
-                format!("a rigidity E t³ V / (12 (1 − ν²)) of {}", number(derived)),
-                "such that it is a positive finite number",
-            )
-        })
+        require(
+            MAGNITUDES.contains(&derived),
+            format_args!("belt.material"),
+            || {
+                (
+                    format!("a rigidity E t³ V / (12 (1 − ν²)) of {}", number(derived)),
+                    format!("such that it is {}", span(&MAGNITUDES)),
+                )
+            },
+        )
     }
 
     fn check_layers(&self) -> Check {
@@ -355,10 +391,17 @@ impl SupportSpec {
     fn check(&self, i: usize, length: f64) -> Check {
         self.at.check(format_args!("supports[{i}].at"), length)?;
         for (j, component) in self.position.iter().flatten().enumerate() {
-            finite(
+            let (field, value) = (
                 format_args!("supports[{i}].position[{j}]"),
                 component.value().unwrap_or(0.0),
-            )?;
+            );
+            finite(field, value)?;
+            require(value.abs() <= FARTHEST * length, field, || {
+                (
+                    number(value),
+                    format!("within {FARTHEST:e} lengths of the belt from the origin"),
+                )
+            })?;
         }
         self.check_orientation(i)?;
         let holds =
@@ -393,14 +436,8 @@ impl SupportSpec {
                 )
             },
         )?;
-        finite_vector(
-            format_args!("supports[{i}].rotation"),
-            &self.rotation.unwrap_or_default(),
-        )?;
-        finite_vector(
-            format_args!("supports[{i}].euler"),
-            &self.euler.unwrap_or_default(),
-        )?;
+        check_angles(format_args!("supports[{i}].rotation"), self.rotation)?;
+        check_angles(format_args!("supports[{i}].euler"), self.euler)?;
         self.quaternion
             .map_or(Ok(()), |quaternion| check_quaternion(i, quaternion))
     }
@@ -484,9 +521,9 @@ impl SolverSpec {
     fn check(&self) -> Check {
         let tolerance = self.tolerance;
         require(
-            tolerance > 0.0 && tolerance < 1.0,
+            TOLERANCES.contains(&tolerance),
             format_args!("solver.tolerance"),
-            || (number(tolerance), "between 0 and 1, both excluded"),
+            || (number(tolerance), span(&TOLERANCES)),
         )?;
         finite_vector(format_args!("solver.bulge"), &self.bulge)?;
         let norm = Vector3::from(self.bulge).norm();
@@ -509,7 +546,11 @@ impl SolverSpec {
             )
         })?;
         within("points", ritz.points, &RITZ_POINTS)?;
-        positive(format_args!("solver.ritz.penalty"), ritz.penalty)?;
+        require(
+            RITZ_PENALTIES.contains(&ritz.penalty),
+            format_args!("solver.ritz.penalty"),
+            || (number(ritz.penalty), span(&RITZ_PENALTIES)),
+        )?;
         within("updates", ritz.updates, &RITZ_UPDATES)
     }
 }
@@ -537,6 +578,20 @@ fn place(u: f64, length: f64) -> String {
         .into_iter()
         .find(|(end, _)| (u - end).abs() <= SAME_PLACE * length);
     number(u) + named.map_or("", |(_, name)| name)
+}
+
+fn check_angles(field: Arguments, angles: Option<[f64; 3]>) -> Check {
+    let angles = angles.unwrap_or_default();
+    finite_vector(field, &angles)?;
+    let largest = angles
+        .iter()
+        .fold(0.0, |most: f64, angle| most.max(angle.abs()));
+    require(largest <= LARGEST_ANGLE, field, || {
+        (
+            number(largest),
+            format!("angles of at most {LARGEST_ANGLE:e} rad"),
+        )
+    })
 }
 
 fn check_quaternion(i: usize, quaternion: [f64; 4]) -> Check {
@@ -587,6 +642,10 @@ fn between(range: &RangeInclusive<usize>) -> String {
     format!("from {} to {}", range.start(), range.end())
 }
 
+fn span(range: &RangeInclusive<f64>) -> String {
+    format!("from {:e} to {:e}", range.start(), range.end())
+}
+
 fn is_positive(value: f64) -> bool {
     value > 0.0 && value.is_finite()
 }
@@ -594,6 +653,14 @@ fn is_positive(value: f64) -> bool {
 fn positive(field: Arguments, value: f64) -> Check {
     require(is_positive(value), field, || {
         (number(value), "a positive finite number")
+    })
+}
+
+/// A positive number from which energies and forces can be computed.
+fn measurable(field: Arguments, value: f64) -> Check {
+    positive(field, value)?;
+    require(MAGNITUDES.contains(&value), field, || {
+        (number(value), span(&MAGNITUDES))
     })
 }
 

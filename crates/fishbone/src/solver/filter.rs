@@ -31,6 +31,11 @@ impl Filter {
         }
     }
 
+    /// Whether nothing is remembered.
+    pub(super) fn is_empty(&self) -> bool {
+        self.entries.is_empty()
+    }
+
     /// Forgets all entries.
     pub(super) fn clear(&mut self) {
         self.entries.clear();

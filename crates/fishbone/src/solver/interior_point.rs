@@ -108,8 +108,10 @@ impl<'a, P: Program> State<'a, P> {
                 return Outcome::Unbounded;
             }
             self.find_step();
-            if !self.search() && !self.restore(proceed) {
-                return Outcome::LocallyInfeasible;
+            if !self.search()
+                && let Some(outcome) = self.recover(proceed)
+            {
+                return outcome;
             }
             self.linearise();
             self.iteration += 1;
@@ -125,9 +127,10 @@ impl<'a, P: Program> State<'a, P> {
     fn finish(mut self, outcome: Outcome) -> Solution<P::Point> {
         // A failed restoration leaves its own derivatives behind.
         self.linearise();
-        self.newton
-            .assemble(&self.linear, &self.values, &self.bound_multipliers);
-        let curvature = self.newton.curvature();
+        self.prefer_zero_multipliers();
+        let curvature = self
+            .newton
+            .curvature(&self.linear, &self.values, &self.bound_multipliers);
         Solution {
             residuals: self.residuals(0.0),
             point: self.point,
@@ -136,6 +139,20 @@ impl<'a, P: Program> State<'a, P> {
             iterations: self.iteration,
             outcome,
             curvature,
+        }
+    }
+
+    /// Drops multipliers that stationarity does not need: where constraints depend on each other they are not unique.
+    fn prefer_zero_multipliers(&mut self) {
+        let residuals = self.residuals(0.0).largest();
+        let found = std::mem::replace(
+            &mut self.multipliers,
+            vec![Rows::zeros(); self.targets.len()],
+        );
+        self.linearise();
+        if self.residuals(0.0).largest() > residuals.max(self.settings.tolerance) {
+            self.multipliers = found;
+            self.linearise();
         }
     }
 
@@ -339,6 +356,20 @@ impl<'a, P: Program> State<'a, P> {
     fn take_trial(&mut self) {
         std::mem::swap(&mut self.point, &mut self.trial);
         std::mem::swap(&mut self.values, &mut self.trial_values);
+    }
+
+    /// Goes on where the line search found nothing: toward the constraints, or where these hold without the filter's
+    /// memory; an outcome where neither is left.
+    fn recover(&mut self, proceed: &mut dyn FnMut() -> ControlFlow<()>) -> Option<Outcome> {
+        if self.violation() > self.settings.tolerance {
+            return (!self.restore(proceed)).then_some(Outcome::LocallyInfeasible);
+        }
+        if self.filter.is_empty() {
+            return Some(Outcome::Stalled);
+        }
+        self.filter.clear();
+        self.centre_bound_multipliers();
+        None
     }
 
     /// Feasibility restoration: steps of least length toward the constraints until the filter takes the point; false

@@ -104,6 +104,8 @@ pub enum Outcome {
     IterationLimit,
     /// The violation of the constraints cannot be lowered any further.
     LocallyInfeasible,
+    /// The constraints hold, and no step lowers the objective by more than rounding.
+    Stalled,
     /// The objective is not bounded below, or not finite.
     Unbounded,
     /// The caller asked to end.
@@ -152,6 +154,16 @@ pub struct Solution<P> {
     pub outcome: Outcome,
     /// Sign of the second variation there.
     pub curvature: Curvature,
+}
+
+impl<P> Solution<P> {
+    /// The same with the iterations of what went before counted in.
+    pub fn after(self, iterations: usize) -> Self {
+        Self {
+            iterations: self.iterations + iterations,
+            ..self
+        }
+    }
 }
 
 /// Sign of the second variation on the tangent space of the constraints.

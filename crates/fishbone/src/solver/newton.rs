@@ -12,6 +12,7 @@ const REFINEMENTS: usize = 2;
 pub(super) struct Newton {
     chain: Chain,
     factor: Factor,
+    weights: Vec<f64>,
     node_weights: Vec<f64>,
     damping: f64,
     right: Vec<NodeVector>,
@@ -33,6 +34,7 @@ impl Newton {
             node_weights: (0..nodes)
                 .map(|k| half(k.checked_sub(1)) + half(Some(k)))
                 .collect(),
+            weights: weights.to_vec(),
             damping: 0.0,
             right: zeros.clone(),
             correction: zeros.clone(),
@@ -43,11 +45,24 @@ impl Newton {
 
     /// Takes over second derivatives, with the bounds eliminated and the constraints as stiff springs.
     pub(super) fn assemble(&mut self, linear: &Linearisation, values: &Values, bounds: &Bounds) {
+        self.assemble_where(linear, values, bounds, |_, _| true);
+    }
+
+    /// The same with the bounds of which `counts(slack, multiplier per weight)` is false left out.
+    fn assemble_where(
+        &mut self,
+        linear: &Linearisation,
+        values: &Values,
+        bounds: &Bounds,
+        counts: impl Fn(f64, f64) -> bool,
+    ) {
         self.chain.stages.copy_from_slice(&linear.chain.stages);
         for (k, stage) in self.chain.stages.iter_mut().enumerate() {
             for (b, gradient) in linear.slacks[k].iter().enumerate() {
-                let stiffness = bounds[k][b] / values.slacks[k][b];
-                stage.controls += stiffness * gradient * gradient.transpose();
+                let (slack, multiplier) = (values.slacks[k][b], bounds[k][b]);
+                if counts(slack, multiplier / self.weights[k]) {
+                    stage.controls += multiplier / slack * gradient * gradient.transpose();
+                }
             }
         }
         for (i, term) in self.chain.nodes.iter_mut().enumerate() {
@@ -81,12 +96,26 @@ impl Newton {
             .factorise(damping, &self.node_weights, &mut self.factor)
     }
 
-    /// Sign of the second variation of what was assembled.
-    pub(super) fn curvature(&mut self) -> Curvature {
-        const MARGIN: f64 = 1e-8;
+    /// Sign of the second variation: positive must hold with the doubtful bounds free, negative with them held, both
+    /// with a margin for rounding and the error of the mesh.
+    pub(super) fn curvature(
+        &mut self,
+        linear: &Linearisation,
+        values: &Values,
+        bounds: &Bounds,
+    ) -> Curvature {
+        const MARGIN: f64 = 1e-4;
+        const CLEAR: f64 = 100.0;
+        self.assemble_where(linear, values, bounds, |slack, multiplier| {
+            multiplier > CLEAR * slack
+        });
         if self.factorise_damped(-MARGIN).is_ok() {
-            Curvature::Positive
-        } else if self.factorise_damped(MARGIN).is_ok() {
+            return Curvature::Positive;
+        }
+        self.assemble_where(linear, values, bounds, |slack, multiplier| {
+            CLEAR * multiplier > slack
+        });
+        if self.factorise_damped(MARGIN).is_ok() {
             Curvature::Marginal
         } else {
             Curvature::Negative

@@ -1,0 +1,188 @@
+//! The search for a minimum: where it starts, and where it starts again.
+
+use crate::energy::EnergyModel;
+use crate::guess::{disturb, guess};
+use crate::program::{BeltPoint, BeltProgram};
+use crate::solver::{self, Curvature, Outcome, Settings, Solution};
+use nalgebra::{Vector2, Vector3};
+use std::ops::ControlFlow;
+
+/// First barrier from a guess: so high that the search first finds the supports, then lowers the energy.
+const COLD: f64 = 10.0;
+/// First barrier from the solution of a problem nearby.
+const WARM: f64 = 0.1;
+const ITERATIONS: usize = 500;
+/// By how much the start is disturbed where the plain one leads to no minimum.
+const DISTURBANCES: [f64; 3] = [0.05, 0.2, 0.4];
+
+type Proceed<'a> = dyn FnMut() -> ControlFlow<()> + 'a;
+
+/// What is asked of a search.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Search {
+    /// The side on which the guess bulges.
+    pub(super) bulge: Vector3<f64>,
+    /// Largest residual of a converged point.
+    pub(super) tolerance: f64,
+}
+
+impl Search {
+    /// The guess, evaluated and left as it is.
+    pub(super) fn start(&self, program: &BeltProgram) -> Solution<BeltPoint> {
+        let settings = Settings {
+            iterations: 0,
+            ..self.settings(COLD)
+        };
+        let start = guess(program, &self.bulge);
+        solver::minimise(program, &settings, start, &mut || ControlFlow::Continue(()))
+    }
+
+    /// Solves on the mesh asked for; where it is finer than the default by way of the default one, so that refining a
+    /// mesh does not lead to another shape of the belt.
+    pub(super) fn run(
+        &self,
+        mesh: &dyn Fn(usize) -> BeltProgram,
+        program: &BeltProgram,
+        default_elements: usize,
+        proceed: &mut Proceed,
+    ) -> Solution<BeltPoint> {
+        if program.elements.len() <= default_elements {
+            return self.cold(program, proceed);
+        }
+        let coarse = mesh(default_elements);
+        let found = self.cold(&coarse, proceed);
+        if found.outcome == Outcome::Interrupted {
+            // The shape still has to be one of the mesh asked for.
+            return self.minimise(
+                program,
+                prolong(&coarse, &found.point, program),
+                WARM,
+                &mut || ControlFlow::Break(()),
+            );
+        }
+        let fine = prolong(&coarse, &found.point, program);
+        let refined = self
+            .minimise(program, fine, WARM, proceed)
+            .after(found.iterations);
+        if rank(&refined) >= rank(&found) || refined.outcome == Outcome::Interrupted {
+            return refined;
+        }
+        better(refined, |_| self.cold(program, proceed))
+    }
+
+    /// Searches from the guess, then from other starts, until a minimum is found; the best that was found otherwise.
+    fn cold(&self, program: &BeltProgram, proceed: &mut Proceed) -> Solution<BeltPoint> {
+        let start = guess(program, &self.bulge);
+        let mut best = self.minimise(program, start.clone(), COLD, proceed);
+        if !is_done(&best) && program.model != EnergyModel::Wunderlich {
+            best = better(best, |_| {
+                self.by_way_of_wunderlich(program, &start, proceed)
+            });
+        }
+        for share in DISTURBANCES {
+            if is_done(&best) {
+                break;
+            }
+            best = better(best, |best| {
+                let from = if best.outcome == Outcome::Converged {
+                    &best.point
+                } else {
+                    &start
+                };
+                self.minimise(program, disturb(program, from, share), COLD, proceed)
+            });
+        }
+        best
+    }
+
+    /// Solves with the energy that keeps the ribs apart of itself, and from there with the one asked for.
+    fn by_way_of_wunderlich(
+        &self,
+        program: &BeltProgram,
+        start: &BeltPoint,
+        proceed: &mut Proceed,
+    ) -> Solution<BeltPoint> {
+        let smooth = BeltProgram {
+            model: EnergyModel::Wunderlich,
+            ..program.clone()
+        };
+        let found = self.minimise(&smooth, start.clone(), COLD, proceed);
+        let iterations = found.iterations;
+        self.minimise(program, inside(found.point), WARM, proceed)
+            .after(iterations)
+    }
+
+    fn minimise(
+        &self,
+        program: &BeltProgram,
+        start: BeltPoint,
+        barrier: f64,
+        proceed: &mut Proceed,
+    ) -> Solution<BeltPoint> {
+        solver::minimise(program, &self.settings(barrier), start, proceed)
+    }
+
+    fn settings(&self, barrier: f64) -> Settings {
+        Settings {
+            tolerance: self.tolerance,
+            iterations: ITERATIONS,
+            barrier,
+        }
+    }
+}
+
+/// Whether to look no further.
+fn is_done(solution: &Solution<BeltPoint>) -> bool {
+    solution.outcome == Outcome::Interrupted || rank(solution) == 2
+}
+
+/// The better of two ends, the later one of equals, with the iterations of both.
+fn better(
+    best: Solution<BeltPoint>,
+    next: impl FnOnce(&Solution<BeltPoint>) -> Solution<BeltPoint>,
+) -> Solution<BeltPoint> {
+    let next = next(&best);
+    let (best_iterations, next_iterations) = (best.iterations, next.iterations);
+    if next.outcome == Outcome::Interrupted || rank(&next) >= rank(&best) {
+        next.after(best_iterations)
+    } else {
+        best.after(next_iterations)
+    }
+}
+
+/// The better of two ends has the higher rank: a minimum, another equilibrium, anything else.
+fn rank(solution: &Solution<BeltPoint>) -> u8 {
+    match (solution.outcome, solution.curvature) {
+        (Outcome::Converged, Curvature::Positive | Curvature::Marginal) => 2,
+        (Outcome::Converged, Curvature::Negative) => 1,
+        _ => 0,
+    }
+}
+
+/// The same shape on another mesh.
+fn prolong(from: &BeltProgram, point: &BeltPoint, to: &BeltProgram) -> BeltPoint {
+    let nodes = from.nodes();
+    let field = |u: f64| -> Vector2<f64> {
+        let next = nodes
+            .partition_point(|node| *node < u)
+            .clamp(1, nodes.len() - 1);
+        let share = (u - nodes[next - 1]) / (nodes[next] - nodes[next - 1]);
+        point.fields[next - 1].lerp(&point.fields[next], share.clamp(0.0, 1.0))
+    };
+    let fields: Vec<_> = to.nodes().into_iter().map(field).collect();
+    let mut prolonged = inside(BeltPoint {
+        poses: vec![point.poses[0]; fields.len()],
+        fields,
+    });
+    to.carry(&mut prolonged);
+    prolonged
+}
+
+/// The same shape with its ribs a little off the bound, where a barrier can start.
+fn inside(mut point: BeltPoint) -> BeltPoint {
+    const OFF: f64 = 0.999;
+    for fields in &mut point.fields {
+        fields[1] *= OFF;
+    }
+    point
+}
