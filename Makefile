@@ -60,6 +60,7 @@ $(VENV)/.rust: $(VENV)/.packages $(RUST_SOURCES)
 	@echo "checking the Rust code"
 	@cargo fmt --all --check
 	@cargo clippy --quiet --locked --workspace --all-targets -- --deny warnings
+	@RUSTDOCFLAGS="--deny warnings" cargo doc --quiet --locked --no-deps --package fishbone
 	@echo "testing the Rust code"
 	@cargo test --quiet --locked --workspace
 	@touch $@

@@ -153,11 +153,11 @@ impl Element {
         let c = Coefficients::at(phi.norm_squared());
         let rotation_by_gauss = self.rotation_by_gauss(&gauss);
         let rotation_by_fields = rotation_by_gauss * GaussFields::by_nodes();
-        let jacobian = left_jacobian(&c, phi);
+        let jacobian = c.left_jacobian(phi);
         IncrementJet {
             value: Pose {
                 position: left_jacobian_times(&c, phi, rho),
-                frame: rotation_matrix(&c, phi),
+                frame: c.exp(phi),
             },
             position_by_fields: left_jacobian_derivative(&c, phi, rho) * rotation_by_fields
                 + jacobian * self.translation_by_gauss() * GaussFields::by_nodes(),
@@ -280,19 +280,7 @@ impl Element {
     }
 }
 
-/// exp([φ]×).
-fn rotation_matrix(c: &Coefficients, phi: &Vector3<f64>) -> Matrix3<f64> {
-    let hat = hat(phi);
-    Matrix3::identity() + c.sine[0] * hat + c.cosine[0] * hat * hat
-}
-
-/// Left Jacobian V(φ) of SO(3); its transpose is the right Jacobian.
-fn left_jacobian(c: &Coefficients, phi: &Vector3<f64>) -> Matrix3<f64> {
-    let hat = hat(phi);
-    Matrix3::identity() + c.cosine[0] * hat + c.cubic[0] * hat * hat
-}
-
-/// V(φ) a.
+/// V(φ) a, with the left Jacobian V of SO(3).
 fn left_jacobian_times(c: &Coefficients, phi: &Vector3<f64>, a: &Vector3<f64>) -> Vector3<f64> {
     let once = phi.cross(a);
     a + c.cosine[0] * once + c.cubic[0] * phi.cross(&once)

@@ -229,8 +229,7 @@ pub fn vee(m: &Matrix3<f64>) -> Vector3<f64> {
 
 /// The rotation `exp([φ]×)` by a rotation vector.
 pub fn exp(rotation: &Vector3<f64>) -> Matrix3<f64> {
-    let c = Coefficients::at(rotation.norm_squared());
-    even_polynomial(rotation, c.sine[0], c.cosine[0])
+    Coefficients::at(rotation.norm_squared()).exp(rotation)
 }
 
 /// The rotation vector of a rotation, its angle in [0, π].
@@ -243,8 +242,7 @@ pub fn log(frame: &Matrix3<f64>) -> Vector3<f64> {
 
 /// The left Jacobian: exp(φ + dφ) = exp(J dφ) exp(φ) to first order.
 pub fn left_jacobian(rotation: &Vector3<f64>) -> Matrix3<f64> {
-    let c = Coefficients::at(rotation.norm_squared());
-    even_polynomial(rotation, c.cosine[0], c.cubic[0])
+    Coefficients::at(rotation.norm_squared()).left_jacobian(rotation)
 }
 
 /// The right Jacobian: exp(φ + dφ) = exp(φ) exp(J dφ) to first order.
@@ -293,6 +291,16 @@ impl Coefficients {
             cosine: with_derivatives(&c, 2),
             cubic: with_derivatives(&c, 3),
         }
+    }
+
+    /// `exp([φ]×)`, the coefficients being those of φ.
+    pub fn exp(&self, rotation: &Vector3<f64>) -> Matrix3<f64> {
+        even_polynomial(rotation, self.sine[0], self.cosine[0])
+    }
+
+    /// The left Jacobian of SO(3) at φ, the coefficients being those of φ.
+    pub fn left_jacobian(&self, rotation: &Vector3<f64>) -> Matrix3<f64> {
+        even_polynomial(rotation, self.cosine[0], self.cubic[0])
     }
 }
 
