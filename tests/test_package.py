@@ -294,3 +294,23 @@ def test_solves_in_threads_do_not_disturb_one_another(example, equilibrium):
     for thread in threads:
         thread.join()
     assert energies == [equilibrium.energy] * 4
+
+
+def test_plot_and_export_are_there_without_an_import_of_their_own():
+    code = "import fishbone as fb; fb.plot.views; fb.export.encode"
+    subprocess.run([sys.executable, "-c", code], check=True)
+    with pytest.raises(AttributeError, match="nothing"):
+        _ = fb.nothing
+
+
+def test_solve_says_what_it_needs():
+    with pytest.raises(fb.InvalidArgument, match=r"found str, allowed a Scenario, as fishbone\.load gives"):
+        fb.solve("example1.toml")  # type: ignore[arg-type]
+
+
+def test_an_orientation_by_more_than_a_turn_is_warned_of(example):
+    tables = example.to_dict()
+    tables["supports"][1]["rotation"] = [0.0, 30.0, 0.0]
+    [warning] = fb.solve(fb.Scenario.from_dict(tables)).warnings
+    assert "supports[1]" in warning
+    assert "radians" in warning

@@ -5,6 +5,9 @@ import fishbone as fb
 equilibrium = fb.solve(fb.load("scenarios/example1.toml"))
 """
 
+import importlib
+from types import ModuleType
+
 from fishbone._core import __version__
 from fishbone.equilibrium import (
     BendRadius,
@@ -15,6 +18,7 @@ from fishbone.equilibrium import (
     Reaction,
     Residuals,
     RibMargin,
+    SpineRadius,
     solve,
 )
 from fishbone.errors import (
@@ -43,7 +47,15 @@ __all__ = [
     "Residuals",
     "RibMargin",
     "Scenario",
+    "SpineRadius",
     "__version__",
     "load",
     "solve",
 ]
+
+
+def __getattr__(name: str) -> ModuleType:
+    """`plot` and `export`, imported when first asked for: they need extra packages and take their time."""
+    if name in {"plot", "export"}:
+        return importlib.import_module(f"fishbone.{name}")
+    raise AttributeError(f"module 'fishbone' has no attribute {name!r}")

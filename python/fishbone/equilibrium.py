@@ -324,9 +324,13 @@ def solve(scenario: Scenario, *, strict: bool = False) -> Equilibrium:
 
     Other threads run meanwhile, and Ctrl-C ends the solve.
 
-    Errors: `NotConverged`, which carries the equilibrium, where `strict` is asked for.
+    Errors: `NotConverged`, which carries the equilibrium, where `strict` is asked for; `InvalidArgument` where
+    `scenario` is none.
     """
-    equilibrium = Equilibrium(scenario, _core.solve(scenario._inner))  # noqa: SLF001 - the same package
+    inner = getattr(scenario, "_inner", None)
+    if not isinstance(inner, _core.Scenario):
+        raise InvalidArgument(f"scenario: found {type(scenario).__name__}, allowed a Scenario, as fishbone.load gives")
+    equilibrium = Equilibrium(scenario, _core.solve(inner))
     if strict and equilibrium.status != "converged":
         raise NotConverged(equilibrium)
     return equilibrium

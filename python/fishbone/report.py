@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich import box
@@ -24,7 +24,7 @@ def report(equilibrium: Equilibrium) -> Group:
     """All that the command line tells of an equilibrium, as rich tables."""
     tables = equilibrium.scenario.to_dict()
     title = f"{tables.get('name') or 'belt'}: {equilibrium.energy_model} energy, {equilibrium.status}"
-    return Group(Text(title, style="bold"), _scalars(equilibrium), _vectors(equilibrium))
+    return Group(Text(title, style="bold"), Text(_supports(equilibrium)), _scalars(equilibrium), _vectors(equilibrium))
 
 
 def number(value: float) -> str:
@@ -60,6 +60,23 @@ def _scalars(equilibrium: Equilibrium) -> Table:
     return table
 
 
+def _supports(equilibrium: Equilibrium) -> str:
+    supports = equilibrium.scenario.to_dict()["supports"]
+    places = [f"{_place(support['at'], equilibrium.u)} {_held(support)}" for support in supports]
+    return ", ".join(places) or "no support, held at the start"
+
+
+def _held(support: dict[str, Any]) -> str:
+    """What a support holds, in a word."""
+    position = support.get("position")
+    turned = any(support.get(key) is not None for key in ("rotation", "euler", "quaternion"))
+    if position is not None and "free" in position:
+        return "sliding"
+    if position is not None:
+        return "clamped" if turned else "pinned"
+    return "held in orientation" if turned else "square rib"
+
+
 def _quantities(equilibrium: Equilibrium) -> Iterator[tuple[str, str, str]]:
     yield "energy", number(equilibrium.energy), ""
     if equilibrium.elastic_energy != equilibrium.energy:
@@ -73,12 +90,12 @@ def _quantities(equilibrium: Equilibrium) -> Iterator[tuple[str, str, str]]:
 
 
 def _extremes(equilibrium: Equilibrium) -> Iterator[tuple[str, str, str]]:
-    least = equilibrium.least_bend_radius
-    if least is not None:
-        yield "least bend radius", number(least.value), f"at u = {number(least.u)}, v = {number(least.v)}"
-    on_spine = equilibrium.least_spine_radius
+    on_spine, least = equilibrium.least_spine_radius, equilibrium.least_bend_radius
     if on_spine is not None:
-        yield "least bend radius on the spine", number(on_spine.value), f"at u = {number(on_spine.u)}"
+        yield "least bend radius, on the spine", number(on_spine.value), f"at u = {number(on_spine.u)}"
+    if least is not None:
+        where = f"at u = {number(least.u)}, v = {number(least.v)} (see docs)"
+        yield "least bend radius, whole width", number(least.value), where
     angle = np.degrees(equilibrium.rib_angle)
     largest = int(np.argmax(np.abs(angle)))
     yield "largest rib angle", number(abs(angle[largest])), f"degrees, at u = {number(equilibrium.u[largest])}"

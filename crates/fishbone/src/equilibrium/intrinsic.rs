@@ -40,7 +40,7 @@ pub(super) fn solve(
     Equilibrium {
         status,
         message,
-        warnings: warnings(&program, is_taut(scenario, units.length), stable),
+        warnings: warnings(scenario, &program, is_taut(scenario, units.length), stable),
         energy,
         elastic_energy: energy,
         torsion: spine.torsion(),
@@ -147,7 +147,12 @@ fn judge(solution: &Solution<BeltPoint>, tolerance: f64) -> (Status, String) {
     }
 }
 
-fn warnings(program: &BeltProgram, taut: bool, stable: Option<bool>) -> Vec<String> {
+fn warnings(
+    scenario: &Scenario,
+    program: &BeltProgram,
+    taut: bool,
+    stable: Option<bool>,
+) -> Vec<String> {
     // Strong twist makes facets of the scale of V, which longer elements cannot resolve.
     const SAFE: f64 = 8.0;
     let shares = program
@@ -157,6 +162,11 @@ fn warnings(program: &BeltProgram, taut: bool, stable: Option<bool>) -> Vec<Stri
     let longest = shares.fold(0.0, f64::max);
     let coarse = longest * SAFE > 1.0 + 1e-9;
     let saddle = stable == Some(false);
+    let turned = scenario
+        .supports
+        .iter()
+        .enumerate()
+        .filter_map(more_than_a_turn);
     [
         coarse.then(|| {
             format!(
@@ -171,7 +181,19 @@ fn warnings(program: &BeltProgram, taut: bool, stable: Option<bool>) -> Vec<Stri
     ]
     .into_iter()
     .flatten()
+    .chain(turned)
     .collect()
+}
+
+/// Says where an orientation is given by more than a turn, as degrees would be.
+fn more_than_a_turn((i, support): (usize, &SupportSpec)) -> Option<String> {
+    let angles = support.rotation.or(support.euler)?;
+    let largest = angles
+        .iter()
+        .fold(0.0, |most: f64, angle| most.max(angle.abs()));
+    (largest > std::f64::consts::TAU).then(|| {
+        format!("supports[{i}] is turned by {largest} rad, which is more than a turn: angles are in radians")
+    })
 }
 
 fn stable(status: Status, curvature: Curvature) -> Option<bool> {
