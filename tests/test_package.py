@@ -228,7 +228,6 @@ def test_a_missing_file_and_a_folder_are_refused_with_their_names(tmp_path):
         assert str(refusal.value).startswith(f"{path}: file: found ")
 
 
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names here")
 def test_a_pipe_is_refused_without_waiting_for_it(tmp_path):
     path = tmp_path / "pipe.toml"
     os.mkfifo(path)

@@ -143,14 +143,16 @@ impl<'a, P: Program> State<'a, P> {
     }
 
     /// Drops multipliers that stationarity does not need: where constraints depend on each other they are not unique.
+    ///
+    /// A loose tolerance must not do so: it would call small forces none.
     fn prefer_zero_multipliers(&mut self) {
-        let residuals = self.residuals(0.0).largest();
+        const NONE: f64 = 1e-8;
         let found = std::mem::replace(
             &mut self.multipliers,
             vec![Rows::zeros(); self.targets.len()],
         );
         self.linearise();
-        if self.residuals(0.0).largest() > residuals.max(self.settings.tolerance) {
+        if self.residuals(0.0).largest() > NONE.min(self.settings.tolerance) {
             self.multipliers = found;
             self.linearise();
         }
