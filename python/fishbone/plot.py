@@ -98,7 +98,7 @@ def views(equilibrium: Equilibrium) -> Figure:
 
 
 def encode(equilibrium: Equilibrium, suffix: str) -> bytes:
-    """The picture's file content, by the suffix of its name; equal for equal shapes.
+    """The picture's file content, by the suffix of its name; equal for equal shapes as PNG and PDF.
 
     Errors: `InvalidArgument` where the suffix is none of `SUFFIXES`.
     """
