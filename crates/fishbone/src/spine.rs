@@ -1,15 +1,54 @@
 //! The solved centre line with its ribs: what the surface and every report are drawn from.
 
 use crate::element::{increment, torsion};
-use crate::lie::Pose;
-use nalgebra::Vector4;
+use crate::lie::{Pose, exp};
+use nalgebra::{Vector3, Vector4};
+
+/// What joins a node of the spine to the next one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Piece {
+    /// A flexible stretch.
+    Strip {
+        /// In-plane curvature κ_g of the flat board.
+        geodesic: f64,
+    },
+    /// A stiffened stretch, straight and flat.
+    Rigid,
+    /// A place of no length where the fields may jump.
+    Joint {
+        /// Angle χ by which the board turns there, from η towards ζ; 0 but at a corner.
+        angle: f64,
+    },
+}
+
+impl Piece {
+    /// In-plane curvature κ_g of the flat board along it.
+    pub fn geodesic(self) -> f64 {
+        match self {
+            Self::Strip { geodesic } => geodesic,
+            Self::Rigid | Self::Joint { .. } => 0.0,
+        }
+    }
+
+    /// Angle by which the board turns at a point, from η towards ζ.
+    pub fn corner(self) -> f64 {
+        match self {
+            Self::Joint { angle } => angle,
+            Self::Rigid | Self::Strip { .. } => 0.0,
+        }
+    }
+}
 
 /// The spine at its nodes, in the units of the scenario.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Spine {
     /// Width V of the belt.
     pub width: f64,
-    /// Arc length u of every node, rising from 0 to U.
+    /// What joins each node to the next. Shapes: one fewer than there are nodes.
+    pub pieces: Vec<Piece>,
+    /// Signed half turns after which the end of a closed belt joins its start; `None` of an open belt.
+    pub half_turns: Option<i32>,
+    /// Arc length u of every node, not falling from 0 to U; repeated at a joint, before and after.
     pub u: Vec<f64>,
     /// Pose of every node.
     pub pose: Vec<Pose>,
@@ -32,15 +71,10 @@ pub struct SpinePoint {
     pub rib_slope: f64,
 }
 
-/// The geodesic curvature κ_g of the spine of a rectangular belt.
-///
-/// Source: Eq. (25)
-const STRAIGHT: f64 = 0.0;
-
 impl Spine {
-    /// The spine of given fields at the nodes, integrated from the pose at the first one.
+    /// The open spine of given fields at the nodes, integrated from the pose at the first one.
     ///
-    /// Shapes: `u`, `bend` and `rib_slope` of one length, `u` not falling.
+    /// Shapes: `u`, `bend` and `rib_slope` of one length, `u` not falling, `pieces` one shorter.
     ///
     /// # Panics
     ///
@@ -48,13 +82,17 @@ impl Spine {
     pub fn from_fields(
         width: f64,
         start: Pose,
+        pieces: Vec<Piece>,
         u: Vec<f64>,
         bend: Vec<f64>,
         rib_slope: Vec<f64>,
     ) -> Self {
         assert!(u.len() == bend.len() && u.len() == rib_slope.len());
+        assert_eq!(pieces.len() + 1, u.len());
         let mut spine = Self {
             width,
+            pieces,
+            half_turns: None,
             pose: vec![start; u.len()],
             u,
             bend,
@@ -64,6 +102,26 @@ impl Spine {
             spine.pose[element + 1] = spine.pose_within(element, spine.element_length(element));
         }
         spine
+    }
+
+    /// The same of a straight belt, whose fields may jump where a node is repeated.
+    ///
+    /// # Panics
+    ///
+    /// If the lengths differ.
+    pub fn straight(
+        width: f64,
+        start: Pose,
+        u: Vec<f64>,
+        bend: Vec<f64>,
+        rib_slope: Vec<f64>,
+    ) -> Self {
+        let piece = |pair: &[f64]| match pair[0] == pair[1] {
+            true => Piece::Joint { angle: 0.0 },
+            false => Piece::Strip { geodesic: 0.0 },
+        };
+        let pieces = u.windows(2).map(piece).collect();
+        Self::from_fields(width, start, pieces, u, bend, rib_slope)
     }
 
     /// Length U.
@@ -158,7 +216,14 @@ impl Spine {
         let (bend, slope) = (self.bend[element], self.rib_slope[element]);
         let (bend_there, slope_there) = self.fields(element, distance);
         let fields = Vector4::new(bend, slope, bend_there, slope_there);
-        self.pose[element] * increment(distance, STRAIGHT, &fields)
+        let piece = self.pieces[element];
+        self.pose[element]
+            * match piece {
+                Piece::Joint { angle } => turn(angle),
+                Piece::Strip { .. } | Piece::Rigid => {
+                    increment(distance, piece.geodesic(), &fields)
+                }
+            }
     }
 
     fn element_twist(&self, element: usize) -> f64 {
@@ -168,6 +233,14 @@ impl Spine {
             torsion(bend, rib_slope)
         };
         length / 6.0 * (at(0.0) + 4.0 * at(0.5 * length) + at(length))
+    }
+}
+
+/// The turn of the frame about ξ at a bend of the board, Rot_ξ(χ).
+pub(crate) fn turn(angle: f64) -> Pose {
+    Pose {
+        frame: exp(&(angle * Vector3::x())),
+        position: Vector3::zeros(),
     }
 }
 
@@ -183,7 +256,7 @@ mod tests {
         let u: Vec<f64> = (0..=n).map(|i| i as f64 / n as f64).collect();
         let bend = u.iter().copied().map(bend).collect();
         let slope = u.iter().copied().map(slope).collect();
-        Spine::from_fields(0.1, Pose::identity(), u, bend, slope)
+        Spine::straight(0.1, Pose::identity(), u, bend, slope)
     }
 
     #[test]
@@ -250,7 +323,7 @@ mod tests {
     #[test]
     fn test_at_a_repeated_node_the_one_before_counts() {
         let u = vec![0.0, 0.5, 0.5, 1.0];
-        let spine = Spine::from_fields(
+        let spine = Spine::straight(
             0.1,
             Pose::identity(),
             u,

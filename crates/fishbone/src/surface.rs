@@ -38,7 +38,7 @@ pub(crate) mod samples {
             translation: Vector3::new(0.1, -0.2, 0.3),
             rotation: Vector3::new(0.5, 0.3, -0.8),
         });
-        Spine::from_fields(width, start, u, bend, slope)
+        Spine::straight(width, start, u, bend, slope)
     }
 
     /// A wave `c0 + c1 cos(k u) + c2 sin(k u)`.

@@ -7,7 +7,7 @@ use crate::lie::Pose;
 use crate::program::{BeltPoint, BeltProgram, NodeSupport};
 use crate::scenario::{Scenario, SupportSpec};
 use crate::solver::{Curvature, Outcome, Solution};
-use crate::spine::Spine;
+use crate::spine::{Piece, Spine};
 use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 use std::ops::ControlFlow;
 
@@ -244,6 +244,14 @@ impl Units {
         let nodes = program.nodes();
         Spine {
             width,
+            pieces: program
+                .elements
+                .iter()
+                .map(|element| Piece::Strip {
+                    geodesic: element.geodesic / self.length,
+                })
+                .collect(),
+            half_turns: None,
             u: nodes.iter().map(|u| u * self.length).collect(),
             pose: point.poses.iter().map(pose).collect(),
             bend: point.fields.iter().map(|f| f[0] / self.length).collect(),

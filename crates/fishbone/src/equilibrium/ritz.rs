@@ -6,7 +6,7 @@ use crate::lie::{Pose, exp, log};
 use crate::ritz::{self, Options, Orientation, Problem, Side, Solution};
 use crate::scenario::{Scenario, SupportSpec};
 use crate::solver::Residuals;
-use crate::spine::Spine;
+use crate::spine::{Piece, Spine};
 use nalgebra::Vector3;
 use std::ops::ControlFlow;
 
@@ -85,6 +85,8 @@ fn report(scenario: &Scenario, belt: &Belt, start: &Pose, solution: &Solution) -
         torsion: rate(1).collect(),
         spine: Spine {
             width: belt.width,
+            pieces: vec![Piece::Strip { geodesic: 0.0 }; count],
+            half_turns: None,
             pose: u.iter().zip(solution.positions(&u)).map(pose).collect(),
             bend: rate(2).collect(),
             rib_slope: u.iter().map(|u| solution.rib_slope(*u)).collect(),

@@ -163,8 +163,8 @@ fn convergence(spine: &Spine, element: usize) -> f64 {
     let rise = spine.rib_slope[element + 1] - spine.rib_slope[element];
     rib_convergence(
         rise / spine.element_length(element),
-        0.0,
-        spine.rib_slope[element],
+        spine.pieces[element].geodesic(),
+        0.5 * (spine.rib_slope[element] + spine.rib_slope[element + 1]),
     )
 }
 
@@ -265,7 +265,7 @@ mod tests {
         // Half a turn of a circle of radius 1/3 in three elements.
         let length = 3.0 * std::f64::consts::PI / 3.0;
         let u = (0..4).map(|i| length * f64::from(i) / 3.0).collect();
-        let spine = Spine::from_fields(0.1, Pose::identity(), u, vec![3.0; 4], vec![0.0; 4]);
+        let spine = Spine::straight(0.1, Pose::identity(), u, vec![3.0; 4], vec![0.0; 4]);
         let direction = Vector3::new(-0.6, 0.8, 0.0) * 5.0;
         let top = highest_point(&spine, &direction);
         let expected = Vector3::new(-1.0 / 3.0, 0.0, 0.0) + direction / 15.0;
@@ -275,7 +275,7 @@ mod tests {
 
     #[test]
     fn test_highest_point_may_be_an_end() {
-        let spine = Spine::from_fields(
+        let spine = Spine::straight(
             0.1,
             Pose::identity(),
             vec![0.0, 1.0],

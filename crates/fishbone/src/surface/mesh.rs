@@ -206,6 +206,7 @@ impl<'a> Builder<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::spine::Piece;
     use crate::surface::samples::{spine, waves};
     use approx::assert_relative_eq;
     use proptest::prelude::*;
@@ -342,6 +343,7 @@ mod tests {
         let mut once = spine(1.0, 0.1, 10, |u| 3.0 * u, |u| u - 0.4);
         let mesh_once = mesh(&once, 3);
         once.u.insert(4, once.u[4]);
+        once.pieces.insert(4, Piece::Joint { angle: 0.0 });
         once.pose.insert(4, once.pose[4]);
         once.bend.insert(4, 7.0);
         once.rib_slope.insert(4, once.rib_slope[4]);
