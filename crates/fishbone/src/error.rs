@@ -48,14 +48,6 @@ pub enum ScenarioError {
         /// What may stand there; completes "must be …".
         allowed: String,
     },
-    /// A part of the schema that this release cannot solve.
-    #[error("{field}: not yet supported: {what}")]
-    Unsupported {
-        /// Path of the field.
-        field: String,
-        /// What is not supported, and what may stand there instead.
-        what: String,
-    },
 }
 
 impl ScenarioError {
@@ -72,22 +64,13 @@ impl ScenarioError {
         }
     }
 
-    /// An [`ScenarioError::Unsupported`] of these parts.
-    pub(crate) fn unsupported(field: impl Into<String>, what: impl Into<String>) -> Self {
-        Self::Unsupported {
-            field: field.into(),
-            what: what.into(),
-        }
-    }
-
     /// Path of the field at fault; `None` for a syntax error.
     pub fn field(&self) -> Option<&str> {
         match self {
             Self::Syntax { .. } => None,
             Self::UnknownField { field, .. }
             | Self::UnknownChoice { field, .. }
-            | Self::Invalid { field, .. }
-            | Self::Unsupported { field, .. } => Some(field),
+            | Self::Invalid { field, .. } => Some(field),
         }
     }
 
@@ -97,8 +80,7 @@ impl ScenarioError {
             Self::Syntax { .. } => {}
             Self::UnknownField { field, .. }
             | Self::UnknownChoice { field, .. }
-            | Self::Invalid { field, .. }
-            | Self::Unsupported { field, .. } => *field = map(field),
+            | Self::Invalid { field, .. } => *field = map(field),
         }
         self
     }

@@ -11,6 +11,7 @@ mod validate;
 
 pub use crate::energy::EnergyModel;
 use crate::lie::{self, Euler};
+use crate::material::{Laminate, Layer, Material};
 use crate::ritz::Options;
 pub use parse::{LONGEST_JSON, LONGEST_TOML};
 
@@ -21,6 +22,9 @@ use serde::{Deserialize, Serialize};
 /// Two places along the spine closer than this, relative to the length of the belt, are one place: sums of decimal
 /// lengths are not exact.
 pub const SAME_PLACE: f64 = 1e-9;
+
+/// Poisson's ratio of a belt that names none.
+pub const DEFAULT_POISSON: f64 = 0.3;
 
 /// A belt, its supports and loads, and how to solve for its shape.
 ///
@@ -41,6 +45,7 @@ pub struct Scenario {
     pub supports: Vec<SupportSpec>,
     /// Pairs of spine points held at a fixed offset, Eq. (35).
     #[serde(default)]
+    #[schemars(length(max = 100))]
     pub links: Vec<LinkSpec>,
     /// Gravity and dead forces.
     #[serde(default)]
@@ -65,11 +70,12 @@ pub struct BeltSpec {
     pub rigidity: Option<f64>,
     /// One homogeneous sheet, in place of `rigidity`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub material: Option<Material>,
+    pub material: Option<MaterialSpec>,
     /// A laminate, in place of `rigidity`: from bottom (−ξ) to top.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub layers: Option<Vec<Layer>>,
-    /// Poisson's ratio ν, used only where `natural_bend` is not 0; a material's own value wins.
+    #[schemars(length(min = 1, max = 1000))]
+    pub layers: Option<Vec<LayerSpec>>,
+    /// Poisson's ratio ν, used only where `natural_bend` is not 0; that of a material or layers wins. Default: 0.3.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = -1, "exclusiveMaximum" = 0.5))]
     pub poisson: Option<f64>,
@@ -85,6 +91,7 @@ pub struct BeltSpec {
     pub closed: bool,
     /// Signed initial twist of a closed belt, in half turns.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = -20, max = 20))]
     pub half_turns: Option<i32>,
     /// What the belt consists of, in order along the spine.
     #[schemars(length(min = 1))]
@@ -94,8 +101,8 @@ pub struct BeltSpec {
 /// A homogeneous, isotropic sheet.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Material {
-    /// Name of a known material, in place of `young`, `poisson` and `density`.
+pub struct MaterialSpec {
+    /// Name of a known material; `young`, `poisson` and `density` are its own unless given. Units: SI.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub preset: Option<String>,
     /// Young's modulus E. Units: Pa.
@@ -118,8 +125,8 @@ pub struct Material {
 /// One layer of a laminate.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Layer {
-    /// Name of a known material.
+pub struct LayerSpec {
+    /// Name of a known material. Units: SI.
     pub material: String,
     /// Thickness. Units: m.
     #[schemars(extend("exclusiveMinimum" = 0))]
@@ -158,7 +165,8 @@ pub enum SegmentSpec {
     },
     /// A bend of the board at a point.
     Corner {
-        /// Angle; positive turns η towards ζ. Units: rad.
+        /// Angle, at most 120° in magnitude; positive turns η towards ζ. Units: rad.
+        #[schemars(range(min = -2.0943951033, max = 2.0943951033))]
         angle: f64,
     },
     /// A stiffener.
@@ -186,10 +194,10 @@ pub enum Rigidity {
 #[serde(deny_unknown_fields)]
 pub struct RigidityTable {
     /// Arc lengths from the start of the segment, rising. Units: m.
-    #[schemars(length(min = 2))]
+    #[schemars(length(min = 2, max = 10_000))]
     pub u: Vec<f64>,
     /// Rigidity at each of them. Units: N·m².
-    #[schemars(length(min = 2))]
+    #[schemars(length(min = 2, max = 10_000))]
     pub value: Vec<f64>,
 }
 
@@ -276,6 +284,7 @@ pub struct LoadsSpec {
     pub gravity: Option<[f64; 3]>,
     /// Dead forces at points.
     #[serde(default)]
+    #[schemars(length(max = 10_000))]
     pub points: Vec<PointLoad>,
 }
 
@@ -385,6 +394,25 @@ impl Scenario {
     pub fn default_elements(&self) -> usize {
         default_elements(self.belt.length(), self.belt.width)
     }
+
+    /// Arc lengths where elements must meet: both ends, joints of segments, supports, links and point loads.
+    ///
+    /// Places within [`SAME_PLACE`] of each other are one. Rising from 0 to U. Units: m.
+    pub fn break_points(&self) -> Vec<f64> {
+        let length = self.belt.length();
+        let supports = self.supports.iter().map(|support| support.at);
+        let links = self.links.iter().flat_map(|link| [link.from, link.to]);
+        let loads = self.loads.points.iter().map(|load| load.at);
+        let places = supports.chain(links).chain(loads);
+        let mut points: Vec<f64> = places.map(|place| place.arc_length(length)).collect();
+        points.extend(self.belt.joints());
+        points.retain(|u| *u > SAME_PLACE * length && *u < length * (1.0 - SAME_PLACE));
+        points.sort_by(f64::total_cmp);
+        points.dedup_by(|u, before| *u - *before <= SAME_PLACE * length);
+        points.insert(0, 0.0);
+        points.push(length);
+        points
+    }
 }
 
 /// 8 U/V rounded up, at least 80; saturates.
@@ -400,48 +428,123 @@ impl BeltSpec {
         self.segments.iter().map(SegmentSpec::length).sum()
     }
 
+    /// Arc lengths of the ends of the segments. Units: m.
+    fn joints(&self) -> impl Iterator<Item = f64> {
+        self.segments.iter().scan(0.0, |u, segment| {
+            *u += segment.length();
+            Some(*u)
+        })
+    }
+
     /// Flexural rigidity R_f of a belt that has one rigidity throughout; `None` of any other. Units: N·m².
     pub fn rigidity_value(&self) -> Option<f64> {
-        let mut flexible = self.segments.iter().filter(|s| s.is_flexible());
-        let first = self.segment_rigidity(flexible.next()?)?;
-        flexible
-            .all(|segment| self.segment_rigidity(segment) == Some(first))
-            .then_some(first)
-    }
-
-    /// Rigidity that stands for the whole belt, from `rigidity` or the material. Units: N·m².
-    fn own_rigidity(&self) -> Option<f64> {
-        self.rigidity
-            .or_else(|| self.material.as_ref()?.rigidity(self.width))
-    }
-
-    fn segment_rigidity(&self, segment: &SegmentSpec) -> Option<f64> {
-        match segment.rigidity() {
+        let own = self.own_rigidity();
+        let mut values = self.flexible().map(|segment| match segment.rigidity() {
             Some(Rigidity::Constant(value)) => Some(*value),
             Some(Rigidity::Table(_)) => None,
-            None => self.own_rigidity(),
+            None => own,
+        });
+        let first = values.next()??;
+        values.all(|value| value == Some(first)).then_some(first)
+    }
+
+    /// Flexural rigidity R_f of segments that have none of their own, from `rigidity`, the material or the layers.
+    /// Units: N·m².
+    pub fn own_rigidity(&self) -> Option<f64> {
+        self.rigidity
+            .or_else(|| Some(self.laminate()?.rigidity * self.width))
+    }
+
+    /// Poisson's ratio ν: that of the material or the layers, else `poisson`, else [`DEFAULT_POISSON`].
+    pub fn poisson_value(&self) -> f64 {
+        let own = self.laminate().map(|laminate| laminate.poisson);
+        own.or(self.poisson).unwrap_or(DEFAULT_POISSON)
+    }
+
+    /// Mass per length of the spine: that of the material or the layers where they give one, else `density`.
+    /// Units: kg/m.
+    pub fn density_value(&self) -> f64 {
+        let own = self.laminate().and_then(|laminate| laminate.mass);
+        own.map_or(self.density, |mass| mass * self.width)
+    }
+
+    /// Whether any part of the unloaded belt is bent.
+    pub fn has_natural_bend(&self) -> bool {
+        self.segments
+            .iter()
+            .any(|segment| self.natural_bend_of(segment) != 0.0)
+    }
+
+    /// Whether the board is one straight strip.
+    fn is_straight(&self) -> bool {
+        let straight = |segment| matches!(segment, &SegmentSpec::Straight { .. });
+        self.segments.iter().all(straight)
+    }
+
+    /// Bend ω_ζ of an unloaded segment: its own, else the belt's; 0 of one that does not bend. Units: rad/m.
+    pub fn natural_bend_of(&self, segment: &SegmentSpec) -> f64 {
+        match segment.is_flexible() {
+            true => segment.natural_bend().unwrap_or(self.natural_bend),
+            false => 0.0,
         }
     }
 
-    /// Mass per length of the spine: the material's where it gives one, else `density`. Units: kg/m.
-    pub fn density_value(&self) -> f64 {
-        self.material
-            .as_ref()
-            .and_then(|material| material.mass_per_length(self.width))
-            .unwrap_or(self.density)
+    fn flexible(&self) -> impl Iterator<Item = &SegmentSpec> {
+        self.segments.iter().filter(|segment| segment.is_flexible())
+    }
+
+    /// The stack that the belt is made of, from `material` or `layers`.
+    fn laminate(&self) -> Option<Laminate> {
+        if let Some(sheet) = &self.material {
+            return Some(Laminate::of(&[sheet.layer()?]));
+        }
+        let layers: Option<Vec<Layer>> =
+            self.layers.as_ref()?.iter().map(LayerSpec::layer).collect();
+        Some(Laminate::of(&layers?))
     }
 }
 
-impl Material {
-    /// Rigidity of a strip of this sheet: E t³ V / (12 (1 − ν²)). Units: N·m².
-    pub fn rigidity(&self, width: f64) -> Option<f64> {
-        let (young, poisson) = (self.young?, self.poisson?);
-        Some(young * self.thickness.powi(3) * width / (12.0 * (1.0 - poisson * poisson)))
+impl MaterialSpec {
+    /// The sheet as a layer; `None` where neither a known preset nor the sheet itself gives its constants.
+    fn layer(&self) -> Option<Layer> {
+        let preset = self.preset.as_deref().and_then(Material::named);
+        let density = preset.and_then(|material| material.density);
+        let material = Material {
+            young: self.young.or(preset.map(|material| material.young))?,
+            poisson: self.poisson.or(preset.map(|material| material.poisson))?,
+            density: self.density.or(density),
+        };
+        Some(Layer {
+            material,
+            thickness: self.thickness,
+        })
     }
+}
 
-    /// Mass per length of a strip of this sheet: ρ V t. Units: kg/m.
-    pub fn mass_per_length(&self, width: f64) -> Option<f64> {
-        Some(self.density? * width * self.thickness)
+impl LayerSpec {
+    /// The layer; `None` of an unknown material.
+    fn layer(&self) -> Option<Layer> {
+        Some(Layer {
+            material: Material::named(&self.material)?,
+            thickness: self.thickness,
+        })
+    }
+}
+
+impl RigidityTable {
+    /// Rigidity at an arc length from the start of the segment: linear between entries, held outside them.
+    /// Units: N·m².
+    ///
+    /// # Panics
+    ///
+    /// If the table has no entries.
+    pub fn at(&self, u: f64) -> f64 {
+        let next = self.u.partition_point(|entry| *entry <= u);
+        if next == 0 || next == self.u.len() {
+            return self.value[next.saturating_sub(1)];
+        }
+        let fraction = (u - self.u[next - 1]) / (self.u[next] - self.u[next - 1]);
+        self.value[next - 1] + fraction * (self.value[next] - self.value[next - 1])
     }
 }
 
@@ -465,6 +568,22 @@ impl SegmentSpec {
         }
     }
 
+    /// In-plane (geodesic) curvature; 0 but of an arc. Units: rad/m.
+    pub fn curvature(&self) -> f64 {
+        match self {
+            Self::Arc { curvature, .. } => *curvature,
+            Self::Straight { .. } | Self::Corner { .. } | Self::Rigid { .. } => 0.0,
+        }
+    }
+
+    /// Angle by which the board turns at a point; 0 but of a corner. Units: rad.
+    pub fn angle(&self) -> f64 {
+        match self {
+            Self::Corner { angle } => *angle,
+            Self::Straight { .. } | Self::Arc { .. } | Self::Rigid { .. } => 0.0,
+        }
+    }
+
     /// The segment's own rigidity, where it has one.
     pub fn rigidity(&self) -> Option<&Rigidity> {
         match self {
@@ -473,7 +592,8 @@ impl SegmentSpec {
         }
     }
 
-    fn natural_bend(&self) -> Option<f64> {
+    /// Bend ω_ζ of the unloaded segment, where it has its own. Units: rad/m.
+    pub fn natural_bend(&self) -> Option<f64> {
         match self {
             Self::Straight { natural_bend, .. } | Self::Arc { natural_bend, .. } => *natural_bend,
             Self::Corner { .. } | Self::Rigid { .. } => None,

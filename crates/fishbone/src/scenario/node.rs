@@ -96,10 +96,25 @@ fn nearest(found: &str, words: &[&str]) -> Option<String> {
     let found = found.to_lowercase();
     words
         .iter()
-        .map(|word| (strsim::damerau_levenshtein(&found, word), word))
+        .map(|word| {
+            (
+                strsim::damerau_levenshtein(&found, &word.to_lowercase()),
+                word,
+            )
+        })
         .min_by_key(|(distance, _)| *distance)
         .filter(|(distance, word)| *distance <= 1 + word.chars().count() / 4)
         .map(|(_, word)| (*word).to_owned())
+}
+
+/// The error of a word outside a list of words, at no field yet.
+pub(super) fn choice(found: &str, words: &[&str]) -> ScenarioError {
+    ScenarioError::UnknownChoice {
+        field: String::new(),
+        nearest: nearest(found, words),
+        found: cut(found),
+        allowed: owned(words),
+    }
 }
 
 fn owned(words: &[&str]) -> Vec<String> {
@@ -359,12 +374,7 @@ impl<'de> Deserializer<'de> for Node {
             Self::Text(word) if variants.contains(&word.as_str()) => {
                 visitor.visit_enum(word.into_deserializer())
             }
-            Self::Text(word) => Err(Located(ScenarioError::UnknownChoice {
-                field: String::new(),
-                nearest: nearest(&word, variants),
-                found: cut(&word),
-                allowed: owned(variants),
-            })),
+            Self::Text(word) => Err(Located(choice(&word, variants))),
             node => node.refuse(format!("one of {}", variants.join(", "))),
         }
     }

@@ -1,0 +1,167 @@
+//! What a scenario must satisfy beyond its types.
+
+mod belt;
+mod check;
+mod outside;
+
+use super::node::number;
+use super::{Method, Scenario, SolverSpec, SupportSpec};
+use crate::error::ScenarioError;
+use check::{Check, between, finite_vector, is_positive, require, span};
+use nalgebra::Vector3;
+use outside::{Extent, check_links, check_supports};
+use std::ops::RangeInclusive;
+
+/// Finer tolerances are below rounding, coarser ones no equilibrium.
+const TOLERANCES: RangeInclusive<f64> = 1e-13..=1e-2;
+
+const ELEMENTS: RangeInclusive<usize> = 4..=100_000;
+const RITZ_BASIS: RangeInclusive<usize> = 6..=40;
+const RITZ_POINTS: RangeInclusive<usize> = 2..=500;
+const RITZ_PENALTIES: RangeInclusive<f64> = 1e-6..=1e12;
+const RITZ_UPDATES: RangeInclusive<usize> = 0..=1000;
+
+impl Scenario {
+    /// Checks every value.
+    ///
+    /// Supports that no shape of the belt can meet are no error here: that is an outcome of the solve.
+    ///
+    /// Errors: the first thing wrong, with its field.
+    pub fn validate(&self) -> Result<(), ScenarioError> {
+        self.belt.check()?;
+        let extent = Extent {
+            length: self.belt.length(),
+            closed: self.belt.closed,
+        };
+        check_supports(&self.supports, extent)?;
+        check_links(&self.links, extent)?;
+        self.loads.check(extent, self.belt.density_value())?;
+        self.solver.check()?;
+        self.check_elements()?;
+        match self.solver.method {
+            Method::Intrinsic => Ok(()),
+            Method::Ritz => self.check_ritz(extent.length),
+        }
+    }
+
+    fn check_elements(&self) -> Check {
+        let elements = self.elements();
+        let source = if self.solver.elements.is_some() {
+            ""
+        } else {
+            " by default (8 U/V)"
+        };
+        let field = format_args!("solver.elements");
+        require(ELEMENTS.contains(&elements), field, || {
+            (format!("{elements}{source}"), between(&ELEMENTS))
+        })?;
+        let least = self.break_points().len() - 1;
+        require(least <= elements, field, || {
+            (
+                format!("{elements}{source}"),
+                format!(
+                    "at least {least}, one a stretch between joints, supports, links and point loads"
+                ),
+            )
+        })
+    }
+
+    /// The source's own method knows straight belts with a connector at either end and no others.
+    fn check_ritz(&self, length: f64) -> Check {
+        let refused = [
+            (
+                !self.belt.is_straight(),
+                "a belt that is not straight",
+                "straight segments alone",
+            ),
+            (self.belt.closed, "a closed belt", "an open belt"),
+            (
+                self.belt.rigidity_value().is_none(),
+                "a rigidity that varies",
+                "one rigidity",
+            ),
+            (
+                self.belt.has_natural_bend(),
+                "a natural bend",
+                "a natural bend of 0",
+            ),
+            (!self.links.is_empty(), "links", "no links"),
+            (!self.loads.is_empty(), "loads", "no loads"),
+            (
+                self.supports.iter().any(|s| s.hinge.is_some()),
+                "a hinge",
+                "no hinges",
+            ),
+            (
+                !self.is_clamped_at_both_ends(length),
+                "other supports than two clamped ends",
+                "both ends alone held in position and orientation with square ribs",
+            ),
+        ];
+        let Some((_, found, cure)) = refused.into_iter().find(|(given, ..)| *given) else {
+            return Ok(());
+        };
+        require(false, format_args!("solver.method"), || {
+            (
+                format!("\"ritz\" with {found}"),
+                format!("\"intrinsic\", or have {cure}"),
+            )
+        })
+    }
+
+    fn is_clamped_at_both_ends(&self, length: f64) -> bool {
+        let clamped = |support: &SupportSpec| {
+            support.at.is_end(length)
+                && support.point().is_some()
+                && support.frame().is_some()
+                && support.is_square_rib(length)
+        };
+        self.supports.len() == 2 && self.supports.iter().all(clamped)
+    }
+}
+
+impl SolverSpec {
+    fn check(&self) -> Check {
+        let tolerance = self.tolerance;
+        require(
+            TOLERANCES.contains(&tolerance),
+            format_args!("solver.tolerance"),
+            || (number(tolerance), span(&TOLERANCES)),
+        )?;
+        finite_vector(format_args!("solver.bulge"), &self.bulge)?;
+        let norm = Vector3::from(self.bulge).norm();
+        require(is_positive(norm), format_args!("solver.bulge"), || {
+            (
+                format!("a vector of length {}", number(norm)),
+                "of a positive finite length",
+            )
+        })?;
+        self.check_ritz()
+    }
+
+    fn check_ritz(&self) -> Check {
+        let ritz = &self.ritz;
+        let fits = RITZ_BASIS.contains(&ritz.basis) && ritz.basis.is_multiple_of(2);
+        require(fits, format_args!("solver.ritz.basis"), || {
+            (
+                ritz.basis.to_string(),
+                format!("an even number {}", between(&RITZ_BASIS)),
+            )
+        })?;
+        within("points", ritz.points, &RITZ_POINTS)?;
+        require(
+            RITZ_PENALTIES.contains(&ritz.penalty),
+            format_args!("solver.ritz.penalty"),
+            || (number(ritz.penalty), span(&RITZ_PENALTIES)),
+        )?;
+        within("updates", ritz.updates, &RITZ_UPDATES)
+    }
+}
+
+fn within(name: &str, value: usize, range: &RangeInclusive<usize>) -> Check {
+    require(
+        range.contains(&value),
+        format_args!("solver.ritz.{name}"),
+        || (value.to_string(), between(range)),
+    )
+}
