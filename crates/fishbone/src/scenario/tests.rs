@@ -109,6 +109,29 @@ fn shipped_scenarios_are_valid_and_survive_a_round_trip() {
 }
 
 #[test]
+fn scenarios_in_the_documentation_are_valid() {
+    let page = include_str!("../../../../docs/scenario.md");
+    let mut blocks = 0;
+    for part in page.split("```toml\n").skip(1) {
+        let (block, _) = part.split_once("```").unwrap();
+        Scenario::from_toml(block).unwrap_or_else(|error| panic!("{block}: {error}"));
+        blocks += 1;
+    }
+    assert_eq!(blocks, 2);
+}
+
+#[test]
+fn materials_in_the_documentation_are_those_of_the_code() {
+    let page = include_str!("../../../../docs/scenario.md");
+    for (name, material) in crate::material::PRESETS {
+        let (young, poisson) = (material.young / 1e9, material.poisson);
+        let density = material.density.unwrap();
+        let row = format!("| `{name}` | {young} | {poisson} | {density} |");
+        assert!(page.contains(&row), "{row}");
+    }
+}
+
+#[test]
 fn examples_of_the_source_name_the_energy_of_the_source_and_others_take_the_default() {
     for (name, _) in SHIPPED {
         let source = name.starts_with("example");
