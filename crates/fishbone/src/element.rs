@@ -3,9 +3,10 @@
 //! An element joins two nodes; its four unknowns are `(bend₀, slope₀, bend₁, slope₁)`, linear in between. Were pose
 //! and energy taken at different points, a node-to-node zigzag of the unknowns would cost one of them nothing.
 
-use crate::energy::EnergyModel;
+use crate::energy::{Curl, EnergyModel, Term};
 use crate::lie::{Coefficients, Pose, Twist, gauss_points, hat, magnus};
-use nalgebra::{Matrix3, Matrix3x4, Matrix4, RowVector4, Vector3, Vector4};
+use crate::strip::{Across, SlopeJet, Strips};
+use nalgebra::{Matrix2x4, Matrix3, Matrix3x4, Matrix4, Vector3, Vector4};
 
 /// Torsion ω_η = −β ω_ζ.
 ///
@@ -41,6 +42,8 @@ pub struct Element {
     pub rigidity: [f64; 2],
     /// Half the width, V/2.
     pub half_width: f64,
+    /// What the element is bent to when nothing acts on it.
+    pub curl: Curl,
 }
 
 /// An increment with its derivatives by the four unknowns.
@@ -58,15 +61,77 @@ pub struct IncrementJet {
     coefficients: Coefficients,
 }
 
-/// Energy of an element with its derivatives by the four unknowns.
+/// A function of the four unknowns with its derivatives.
 #[derive(Debug, Clone, Copy)]
-pub struct EnergyJet {
-    /// Energy.
+pub struct Jet {
+    /// Value.
     pub value: f64,
     /// Gradient.
     pub gradient: Vector4<f64>,
     /// Hessian.
     pub hessian: Matrix4<f64>,
+}
+
+impl Jet {
+    fn zero() -> Self {
+        Self {
+            value: 0.0,
+            gradient: Vector4::zeros(),
+            hessian: Matrix4::zeros(),
+        }
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.value += other.value;
+        self.gradient += other.gradient;
+        self.hessian += other.hessian;
+    }
+
+    /// Adds a term of the density at parameter t of the element.
+    fn add_term(&mut self, weight: f64, term: &Term, t: f64) {
+        let inputs = Matrix2x4::new(
+            1.0 - t,
+            0.0,
+            t,
+            0.0, //
+            0.0,
+            1.0 - t,
+            0.0,
+            t,
+        );
+        self.value += weight * term.value;
+        self.gradient += weight * inputs.tr_mul(&term.gradient);
+        self.hessian += weight * inputs.tr_mul(&(term.hessian * inputs));
+    }
+
+    fn times(&self, factor: &Self) -> Self {
+        let mixed = self.gradient * factor.gradient.transpose();
+        Self {
+            value: self.value * factor.value,
+            gradient: self.value * factor.gradient + factor.value * self.gradient,
+            hessian: self.value * factor.hessian
+                + factor.value * self.hessian
+                + mixed
+                + mixed.transpose(),
+        }
+    }
+}
+
+impl From<SlopeJet> for Jet {
+    fn from(jet: SlopeJet) -> Self {
+        let (g, h) = (jet.gradient, jet.hessian);
+        let mut hessian = Matrix4::zeros();
+        for (i, row) in [1, 3].into_iter().enumerate() {
+            for (j, column) in [1, 3].into_iter().enumerate() {
+                hessian[(row, column)] = h[(i, j)];
+            }
+        }
+        Self {
+            value: jet.value,
+            gradient: Vector4::new(0.0, g[0], 0.0, g[1]),
+            hessian,
+        }
+    }
 }
 
 /// Bend and slope at the two Gauss points.
@@ -129,15 +194,26 @@ impl GaussFields {
 }
 
 impl Element {
-    /// The rib measure s = β' + κ_g(1+β²) times V/2, at the middle of the element; ribs cross beyond ±1, Eq. (33).
-    pub fn rib_share(&self, fields: &Vector4<f64>) -> f64 {
-        self.half_width * (fields[3] - fields[1]) / self.length
+    fn strips(&self) -> Strips {
+        Strips {
+            half_width: self.half_width,
+            geodesic: self.geodesic,
+            length: self.length,
+        }
     }
 
-    /// Derivative of the rib share by the four unknowns.
-    pub fn rib_share_gradient(&self) -> Vector4<f64> {
-        let rate = self.half_width / self.length;
-        Vector4::new(0.0, -rate, 0.0, rate)
+    /// How far the ribs are from crossing at the +ζ and at the −ζ edge; admissible where positive.
+    ///
+    /// Source: Eq. (33), extended to curved belts
+    pub fn slacks(&self, fields: &Vector4<f64>) -> [f64; 2] {
+        self.strips().slacks([fields[1], fields[3]])
+    }
+
+    /// The same with derivatives.
+    pub fn slack_jets(&self, fields: &Vector4<f64>) -> [Jet; 2] {
+        self.strips()
+            .slack_jets([fields[1], fields[3]])
+            .map(Jet::from)
     }
 
     /// Pose increment by a fourth-order Magnus step.
@@ -195,37 +271,52 @@ impl Element {
     /// Energy, without derivatives.
     pub fn energy(&self, model: EnergyModel, fields: &Vector4<f64>) -> f64 {
         let gauss = GaussFields::at(fields);
-        let y = self.rib_share(fields);
-        (0..2)
-            .map(|i| {
-                0.5 * self.length * self.rigidity[i] * model.value(gauss.bend[i], gauss.slope[i], y)
-            })
-            .sum()
+        let across = if model.knows_width() {
+            self.strips().across([fields[1], fields[3]])
+        } else {
+            Across::PLAIN
+        };
+        let at = |i: usize| {
+            let density = model.value(gauss.bend[i], gauss.slope[i], &self.curl, &across);
+            0.5 * self.length * self.rigidity[i] * density
+        };
+        at(0) + at(1)
     }
 
     /// Energy with its derivatives.
-    pub fn energy_jet(&self, model: EnergyModel, fields: &Vector4<f64>) -> EnergyJet {
+    pub fn energy_jet(&self, model: EnergyModel, fields: &Vector4<f64>) -> Jet {
         let gauss = GaussFields::at(fields);
-        let y = self.rib_share(fields);
-        let share = self.rib_share_gradient();
-        let mut jet = EnergyJet {
-            value: 0.0,
-            gradient: Vector4::zeros(),
-            hessian: Matrix4::zeros(),
+        let bending = self.integral(&gauss, |bend, slope| model.bending(bend, slope));
+        let across = model.knows_width().then(|| {
+            self.strips()
+                .across_jets([fields[1], fields[3]])
+                .map(Jet::from)
+        });
+        let mut sum = match &across {
+            Some(across) => bending.times(&across.bending),
+            None => bending,
         };
+        if self.curl.bend != 0.0 {
+            let mixed = self.integral(&gauss, |bend, slope| model.mixed(bend, slope, &self.curl));
+            let natural = self.integral(&gauss, |_, slope| model.natural(slope, &self.curl));
+            for (term, factor) in [
+                (mixed, across.map(|across| across.length)),
+                (natural, across.map(|across| across.area)),
+            ] {
+                sum.add(&factor.map_or(term, |factor| term.times(&factor)));
+            }
+        }
+        sum
+    }
+
+    /// Integral of R_f times a term of the density.
+    fn integral(&self, gauss: &GaussFields, term: impl Fn(f64, f64) -> Term) -> Jet {
+        let mut sum = Jet::zero();
         for (i, t) in gauss_points().into_iter().enumerate() {
             let weight = 0.5 * self.length * self.rigidity[i];
-            let density = model.density(gauss.bend[i], gauss.slope[i], y);
-            let inputs = Matrix3x4::from_rows(&[
-                RowVector4::new(1.0 - t, 0.0, t, 0.0),
-                RowVector4::new(0.0, 1.0 - t, 0.0, t),
-                share.transpose(),
-            ]);
-            jet.value += weight * density.value;
-            jet.gradient += weight * inputs.transpose() * density.gradient;
-            jet.hessian += weight * inputs.transpose() * density.hessian * inputs;
+            sum.add_term(weight, &term(gauss.bend[i], gauss.slope[i]), t);
         }
-        jet
+        sum
     }
 
     /// Weight of the sum and of the commutator in the Magnus step.
@@ -427,6 +518,10 @@ mod tests {
                     geodesic,
                     rigidity: [1.3, 0.7],
                     half_width: 0.05,
+                    curl: Curl {
+                        bend: 2.0 * geodesic,
+                        poisson: 0.34,
+                    },
                 };
                 cases.push((
                     element,
@@ -497,27 +592,16 @@ mod tests {
             for (element, w) in cases() {
                 let (value, gradient, second) = hessian(
                     |x: SVector<num_dual::Dual2SVec64<4>, 4>| {
-                        let y = (x[3] - x[1]) * (element.half_width / element.length);
-                        let width = match model {
-                            EnergyModel::Wunderlich => {
-                                ((y + 1.0).ln() - (-y + 1.0).ln()) / (y * 2.0)
-                            }
-                            _ => y * 0.0 + 1.0,
+                        let across = match model {
+                            EnergyModel::Wunderlich => element.strips().across([x[1], x[3]]),
+                            _ => Across::PLAIN.map(num_dual::Dual2SVec64::from),
                         };
-                        let power = if model == EnergyModel::Fishbone {
-                            2.5
-                        } else {
-                            2.0
-                        };
-                        let mut sum = y * 0.0;
+                        let mut sum = x[0] * 0.0;
                         for (t, r) in gauss_points().into_iter().zip(element.rigidity) {
                             let bend = x[0] * (1.0 - t) + x[2] * t;
                             let slope = x[1] * (1.0 - t) + x[3] * t;
-                            sum += bend
-                                * bend
-                                * (slope * slope + 1.0).powf(power)
-                                * width
-                                * (0.25 * element.length * r);
+                            sum += model.value(bend, slope, &element.curl, &across)
+                                * (0.5 * element.length * r);
                         }
                         sum
                     },

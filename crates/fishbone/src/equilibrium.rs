@@ -1,11 +1,12 @@
 //! From a scenario to an equilibrium.
 
+mod assembly;
 mod intrinsic;
 mod ritz;
 mod search;
 
 use crate::belt::Belt;
-use crate::scenario::{Method, Scenario, SupportSpec};
+use crate::scenario::{LinkSpec, Method, Scenario, SupportSpec};
 use crate::solver::Residuals;
 use crate::spine::Spine;
 use nalgebra::Vector3;
@@ -43,6 +44,13 @@ pub struct Reaction {
     pub wrench: Wrench,
 }
 
+/// What a link does to the belt.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LinkForce {
+    /// Force on the belt at the link's point `to`, world axes; at `from` acts the opposite.
+    pub force: Vector3<f64>,
+}
+
 /// The outcome of a solve, in the units of the scenario.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Equilibrium {
@@ -66,6 +74,8 @@ pub struct Equilibrium {
     pub internal: Vec<Wrench>,
     /// What each support does to the belt, in the order of the scenario; empty where the method knows no forces.
     pub reactions: Vec<Reaction>,
+    /// What each link does to the belt, in the order of the scenario.
+    pub links: Vec<LinkForce>,
     /// Whether the equilibrium is a local minimum, where known.
     pub stable: Option<bool>,
     /// How far the shape is from a solution of its discrete equations, lengths in U and energy in mean R_f/U.
@@ -87,6 +97,11 @@ impl Units {
             length: belt.length(),
             energy: belt.mean_rigidity() / belt.length(),
         }
+    }
+
+    /// The unit of force.
+    fn force(&self) -> f64 {
+        self.energy / self.length
     }
 }
 
@@ -138,21 +153,41 @@ impl Span {
     }
 }
 
-/// Says by how much two supports are too far apart for the belt between them, where they are.
+/// Says by how much two supports, or the ends of a link, are too far apart for the belt between them, where they are.
 fn excess_distance(scenario: &Scenario, length: f64) -> Option<String> {
     let mut spans = scenario
         .supports
         .windows(2)
         .map(|pair| Span::between(pair, length));
-    let span = spans.find(|span| span.excess() > span.rounding)?;
-    Some(format!(
-        "supports at u = {} and u = {} are {} apart, {} more than the belt between them ({}); move them closer",
-        number(span.u[0]),
-        number(span.u[1]),
-        number(span.distance),
-        number(span.excess()),
-        number(span.u[1] - span.u[0])
-    ))
+    if let Some(span) = spans.find(|span| span.excess() > span.rounding) {
+        return Some(format!(
+            "supports at u = {} and u = {} are {} apart, {} more than the belt between them ({}); move them closer",
+            number(span.u[0]),
+            number(span.u[1]),
+            number(span.distance),
+            number(span.excess()),
+            number(span.u[1] - span.u[0])
+        ));
+    }
+    let links = scenario.links.iter().enumerate();
+    links
+        .filter_map(|(i, link)| too_long(i, link, length))
+        .next()
+}
+
+/// Says that a link asks for more distance than there is belt between its ends, where it does.
+fn too_long(i: usize, link: &LinkSpec, length: f64) -> Option<String> {
+    let [from, to] = [link.from, link.to].map(|place| place.arc_length(length));
+    let (between, distance) = ((to - from).abs(), Vector3::from(link.offset).norm());
+    (distance > between * (1.0 + 1e-12)).then(|| {
+        format!(
+            "links[{i}] holds u = {} and u = {} at a distance of {}, {} more than the belt between them; shorten its offset",
+            number(from),
+            number(to),
+            number(distance),
+            number(distance - between)
+        )
+    })
 }
 
 /// Whether two supports leave the belt between them so little slack that its reactions are not determined.

@@ -1,8 +1,8 @@
-//! Where the search for an equilibrium starts: a plane arch on the side of the bulge.
+//! Where the search for an equilibrium starts: an arch on the side of the bulge, with ribs that do not cross.
 
 use crate::lie::{Pose, exp, log};
-use crate::program::{BeltPoint, BeltProgram, NodeSupport};
-use nalgebra::{Matrix3, Vector2, Vector3};
+use crate::program::{BeltPoint, BeltProgram, NodeSupport, Piece};
+use nalgebra::{Matrix3, UnitQuaternion, Vector2, Vector3};
 use std::f64::consts::PI;
 
 /// Samples of the arch when its reach is measured.
@@ -50,65 +50,241 @@ impl Arch {
     }
 }
 
-/// A start for the search: the plane arch whose reach comes nearest to what the supports at the two ends ask for,
-/// bulging to the side of `bulge`.
+/// A start for the search: the arch whose reach comes nearest to what the supports at the two ends ask for, bulging to
+/// the side of `bulge`, with ribs that do not cross.
 pub(crate) fn guess(program: &BeltProgram, bulge: &Vector3<f64>) -> BeltPoint {
-    let last = program.elements.len();
+    let last = program.pieces.len();
     let at = |node: usize| program.supports.iter().find(|s| s.node == node);
     let (start, end) = (at(0), at(last));
-    let frame = start_frame(start, end, bulge);
-    let arch = fit_arch(&frame, start, end, bulge);
-    let field = |u: f64| Vector2::new(arch.bend(u), 0.0);
-    let fields = program.nodes().into_iter().map(field).collect();
-    let tilt = exp(&Vector3::new(0.0, 0.0, arch.angle(0.0)));
-    let mut point = BeltPoint {
-        fields,
-        poses: vec![
-            Pose {
-                frame: frame * tilt,
-                position: Vector3::zeros(),
-            };
-            last + 1
-        ],
-    };
-    program.carry(&mut point);
+    let slopes = calm_slopes(program);
+    let frame = start_frame(program, start, end, bulge);
+    let arch = fit_arch(program, &slopes, &frame, start, end, bulge);
+    let mut point = arched(program, &arch, &slopes, &frame);
     place(&mut point, start, end);
     point
+}
+
+/// The belt bent to an arch, from a frame at the origin.
+fn arched(program: &BeltProgram, arch: &Arch, slopes: &[f64], frame: &Matrix3<f64>) -> BeltPoint {
+    let nodes = program.nodes();
+    let field = |(u, slope): (&f64, &f64)| Vector2::new(arch.bend(*u), *slope);
+    let start = Pose {
+        frame: frame * exp(&Vector3::new(0.0, 0.0, arch.angle(0.0))),
+        position: Vector3::zeros(),
+    };
+    let mut point = BeltPoint {
+        fields: nodes.iter().zip(slopes).map(field).collect(),
+        poses: vec![start; nodes.len()],
+    };
+    program.settle(&mut point);
+    point
+}
+
+/// Rib slopes far from crossing, square where they are held so: the best of those in which the ribs turn with the spine,
+/// but more gently, over as many widths as it takes.
+///
+/// Parallel ribs never cross, whatever the spine does; ribs square to the spine cross at every bend of the board.
+pub(crate) fn calm_slopes(program: &BeltProgram) -> Vec<f64> {
+    const WIDTHS: [f64; 7] = [0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0];
+    const CALM: f64 = 0.3;
+    let board = Headings::of(program);
+    let width = program
+        .elements()
+        .map(|(_, element)| 2.0 * element.half_width)
+        .fold(0.0, f64::max);
+    let mut best = (f64::NEG_INFINITY, vec![0.0; board.u.len()]);
+    let smooth = WIDTHS.iter().map(|widths| board.slopes(widths * width));
+    let mitred = WIDTHS
+        .iter()
+        .map(|widths| mitred_slopes(program, widths * width));
+    for slopes in smooth.chain(mitred) {
+        let mut point = BeltPoint {
+            fields: slopes
+                .iter()
+                .map(|slope| Vector2::new(0.0, *slope))
+                .collect(),
+            poses: vec![Pose::identity(); slopes.len()],
+        };
+        program.settle(&mut point);
+        let slack = program.least_slack(&point);
+        if slack > best.0 {
+            best = (slack, point.fields.iter().map(|fields| fields[1]).collect());
+        }
+        if best.0 >= CALM {
+            break;
+        }
+    }
+    best.1
+}
+
+/// Rib slopes along the mitre at every bend, square where held so, linear in between and square beyond a reach of both.
+fn mitred_slopes(program: &BeltProgram, reach: f64) -> Vec<f64> {
+    let u = program.nodes();
+    let mut anchors: Vec<(f64, f64)> = Vec::new();
+    let mut anchor = |u: f64, slope: f64| {
+        if let Some((before, _)) = anchors.last().copied()
+            && u - before > 2.0 * reach
+        {
+            anchors.extend([(before + reach, 0.0), (u - reach, 0.0)]);
+        }
+        anchors.push((u, slope));
+    };
+    anchor(u[0], 0.0);
+    for (k, piece) in program.pieces.iter().enumerate() {
+        let mitre = match piece {
+            Piece::Joint { angle } => (0.5 * angle).tan(),
+            Piece::Strip(_) | Piece::Rigid { .. } => 0.0,
+        };
+        if mitre != 0.0 || program.fixed_slope(k).is_some() {
+            anchor(u[k], program.fixed_slope(k).unwrap_or(mitre));
+        }
+        if mitre != 0.0 {
+            anchor(u[k + 1], program.fixed_slope(k + 1).unwrap_or(-mitre));
+        }
+    }
+    anchor(u[u.len() - 1], 0.0);
+    let at = |(node, u): (usize, &f64)| {
+        let after_joint = node > 0 && matches!(program.pieces[node - 1], Piece::Joint { .. });
+        let next = anchors.partition_point(|(place, _)| place < u || (after_joint && place == u));
+        let next = next.clamp(1, anchors.len() - 1);
+        let ((a, left), (b, right)) = (anchors[next - 1], anchors[next]);
+        let share = if b > a { (u - a) / (b - a) } else { 1.0 };
+        left + share.clamp(0.0, 1.0) * (right - left)
+    };
+    u.iter().enumerate().map(at).collect()
+}
+
+/// Which way the spine of the flat board heads.
+struct Headings {
+    u: Vec<f64>,
+    /// Angle from η at the start towards ζ, at every node.
+    heading: Vec<f64>,
+    /// Its integral from the start.
+    integral: Vec<f64>,
+    /// Arc lengths where the rib is held.
+    held: Vec<f64>,
+}
+
+impl Headings {
+    fn of(program: &BeltProgram) -> Self {
+        let u = program.nodes();
+        let (mut heading, mut integral) = (vec![0.0], vec![0.0]);
+        for (k, piece) in program.pieces.iter().enumerate() {
+            let turn = match piece {
+                Piece::Strip(element) => element.geodesic * element.length,
+                Piece::Joint { angle } => *angle,
+                Piece::Rigid { .. } => 0.0,
+            };
+            integral.push(integral[k] + piece.length() * (heading[k] + 0.5 * turn));
+            heading.push(heading[k] + turn);
+        }
+        let held = (0..u.len()).filter(|node| program.fixed_slope(*node).is_some());
+        Self {
+            held: held.map(|node| u[node]).collect(),
+            heading,
+            integral,
+            u,
+        }
+    }
+
+    /// Rib slopes of which the flat direction is the mean heading within a reach on either side, less near held ribs.
+    fn slopes(&self, reach: f64) -> Vec<f64> {
+        const SHORTEST: f64 = 1e-6;
+        let slope = |(u, heading): (&f64, &f64)| {
+            let free = self.held.iter().map(|held| (held - u).abs());
+            let reach = free.fold(reach.max(SHORTEST), f64::min);
+            let mean = (self.integral_at(u + reach) - self.integral_at(u - reach)) / (2.0 * reach);
+            match reach < SHORTEST {
+                true => 0.0,
+                false => (mean - heading).clamp(-1.5, 1.5).tan(),
+            }
+        };
+        self.u.iter().zip(&self.heading).map(slope).collect()
+    }
+
+    /// Integral of the heading from the start, going on straight beyond the ends.
+    fn integral_at(&self, u: f64) -> f64 {
+        let last = self.u.len() - 1;
+        let k = self.u.partition_point(|node| *node <= u);
+        if k == 0 {
+            return u * self.heading[0];
+        }
+        let past = u - self.u[k - 1];
+        if k > last {
+            return self.integral[last] + past * self.heading[last];
+        }
+        let length = self.u[k] - self.u[k - 1];
+        let rise = self.heading[k] - self.heading[k - 1];
+        self.integral[k - 1] + past * (self.heading[k - 1] + 0.5 * rise * past / length)
+    }
+
+    /// Whether the board is straight all along.
+    fn is_straight(&self) -> bool {
+        self.heading.iter().all(|heading| *heading == 0.0)
+    }
 }
 
 /// Disturbs a start or a saddle out of its symmetry by a smooth twist and a sway, `share` of what the rib bound allows.
 pub(crate) fn disturb(program: &BeltProgram, point: &BeltPoint, share: f64) -> BeltPoint {
     let steepest = PI * (1.0 + 2.0 * 0.7);
     let bound = program
-        .elements
-        .iter()
-        .map(|element| 1.0 / element.half_width)
+        .elements()
+        .map(|(_, element)| 1.0 / element.half_width)
         .fold(f64::INFINITY, f64::min);
     let twist = share * (bound / steepest).min(1.0);
+    let calm = calm_slopes(program);
     let mut disturbed = point.clone();
-    for (fields, u) in disturbed.fields.iter_mut().zip(program.nodes()) {
+    for ((fields, calm), u) in disturbed.fields.iter_mut().zip(&calm).zip(program.nodes()) {
         let (once, twice) = ((PI * u).sin(), (2.0 * PI * u).sin());
-        *fields *= 1.0 - share;
-        *fields += Vector2::new(share * twice, twist * (once + 0.7 * twice));
+        let sway = Vector2::new(share * twice, twist * (once + 0.7 * twice));
+        *fields =
+            Vector2::new(0.0, *calm) + (1.0 - share) * (*fields - Vector2::new(0.0, *calm)) + sway;
     }
-    program.carry(&mut disturbed);
-    disturbed
+    inside(program, disturbed)
 }
 
-/// Frame at u = 0: as held there, else as held at the end, else along the chord with the normal toward the bulge.
+/// The same shape with its ribs a little off the bound, where a barrier can start.
+pub(crate) fn inside(program: &BeltProgram, mut point: BeltPoint) -> BeltPoint {
+    const OFF: f64 = 0.999;
+    const HALVINGS: usize = 12;
+    let calm = calm_slopes(program);
+    let wild: Vec<f64> = point.fields.iter().map(|fields| fields[1]).collect();
+    let mut share = OFF;
+    for _ in 0..HALVINGS {
+        for ((fields, calm), wild) in point.fields.iter_mut().zip(&calm).zip(&wild) {
+            fields[1] = calm + share * (wild - calm);
+        }
+        program.settle(&mut point);
+        if program.least_slack(&point) > 0.0 {
+            break;
+        }
+        share *= 0.5;
+    }
+    point
+}
+
+/// Frame at u = 0: as held there, else such that the flat board ends as held there, else along the chord with the normal
+/// toward the bulge.
 fn start_frame(
+    program: &BeltProgram,
     start: Option<&NodeSupport>,
     end: Option<&NodeSupport>,
     bulge: &Vector3<f64>,
 ) -> Matrix3<f64> {
     let held = |support: Option<&NodeSupport>| {
         support
-            .and_then(|s| s.frame)
+            .and_then(|s| s.hold.frame())
             .map(|q| q.to_rotation_matrix().into_inner())
     };
+    let turned = |end| end * exp(&(-total_turn(program) * Vector3::x()));
     held(start)
-        .or_else(|| held(end))
+        .or_else(|| held(end).map(turned))
         .unwrap_or_else(|| frame_along(&chord(start, end).unwrap_or_default(), bulge))
+}
+
+/// Angle from the heading of the flat board's start to that of its end.
+fn total_turn(program: &BeltProgram) -> f64 {
+    Headings::of(program).heading.last().copied().unwrap_or(0.0)
 }
 
 /// The frame with the tangent along `along` and the normal as near as can be to `toward`; the natural frame where
@@ -132,39 +308,51 @@ fn chord(start: Option<&NodeSupport>, end: Option<&NodeSupport>) -> Option<Vecto
 
 /// The arch whose reach is nearest to the chord.
 fn fit_arch(
+    program: &BeltProgram,
+    slopes: &[f64],
     frame: &Matrix3<f64>,
     start: Option<&NodeSupport>,
     end: Option<&NodeSupport>,
     bulge: &Vector3<f64>,
 ) -> Arch {
-    let frames = start.and_then(|s| s.frame).zip(end.and_then(|s| s.frame));
-    let gap = frames.map_or(Vector3::zeros(), |(a, b)| {
-        log((a.conjugate() * b).to_rotation_matrix().matrix())
-    });
+    let held = |support: Option<&NodeSupport>| support.and_then(|s| s.hold.frame());
+    let flat = UnitQuaternion::from_scaled_axis(total_turn(program) * Vector3::x());
+    let gap = match (held(start), held(end)) {
+        (Some(a), Some(b)) => log((a.conjugate() * b * flat.conjugate())
+            .to_rotation_matrix()
+            .matrix()),
+        _ => Vector3::zeros(),
+    };
     let middle = frame * exp(&(0.5 * gap));
     let side = if middle.column(0).dot(bulge) < 0.0 {
         -1.0
     } else {
         1.0
     };
-    let pinned = [start, end]
-        .iter()
-        .all(|s| s.is_none_or(|s| s.frame.is_none()));
     let arch = |height: f64| Arch {
         amplitude: side * height,
         turn: gap.z,
-        pinned,
+        pinned: held(start).is_none() && held(end).is_none(),
     };
     let Some(chord) = chord(start, end) else {
         return arch(0.0);
     };
+    let straight = Headings::of(program).is_straight();
     let local = frame.tr_mul(&chord);
-    let anchored = start.is_some_and(|s| s.frame.is_some());
+    let reach = |arch: &Arch| {
+        if straight {
+            let reach = arch.reach();
+            return Vector3::new(reach.x, reach.y, 0.0);
+        }
+        let poses = arched(program, arch, slopes, frame).poses;
+        let end = poses.last().map_or(Vector3::zeros(), |pose| pose.position);
+        frame.tr_mul(&end)
+    };
     arch(least(HIGHEST, |height| {
-        let reach = arch(height).reach();
+        let reach = reach(&arch(height));
         // Not squared: on a nearly taut belt the miss is itself a square of the height.
-        if anchored {
-            (Vector3::new(reach.x, reach.y, 0.0) - local).norm()
+        if held(start).is_some() {
+            (reach - local).norm()
         } else {
             (reach.norm() - chord.norm()).abs()
         }
@@ -211,14 +399,16 @@ fn place(point: &mut BeltPoint, start: Option<&NodeSupport>, end: Option<&NodeSu
 mod tests {
     use super::*;
     use crate::element::Element;
-    use crate::energy::EnergyModel;
-    use nalgebra::UnitQuaternion;
+    use crate::energy::{Curl, EnergyModel};
+    use crate::program::Hold;
 
     fn held(node: usize, position: [f64; 3], rotation: Option<[f64; 3]>) -> NodeSupport {
         NodeSupport {
             node,
             position: position.map(Some),
-            frame: rotation.map(|r| UnitQuaternion::from_scaled_axis(Vector3::from(r))),
+            hold: rotation.map_or(Hold::Free, |r| {
+                Hold::Frame(UnitQuaternion::from_scaled_axis(Vector3::from(r)))
+            }),
             square_rib: false,
         }
     }
@@ -229,12 +419,10 @@ mod tests {
             geodesic: 0.0,
             rigidity: [1.0; 2],
             half_width: 0.05,
+            curl: Curl::default(),
         };
-        BeltProgram {
-            elements: vec![element; 40],
-            model: EnergyModel::Wunderlich,
-            supports,
-        }
+        BeltProgram::new(vec![Piece::Strip(element); 40], EnergyModel::Wunderlich)
+            .with_supports(supports)
     }
 
     fn end(point: &BeltPoint) -> Vector3<f64> {
@@ -298,10 +486,56 @@ mod tests {
         let program = program(clamps);
         let start = guess(&program, &Vector3::x());
         let disturbed = disturb(&program, &start, 0.4);
-        for pair in disturbed.fields.windows(2) {
-            assert!((pair[1][1] - pair[0][1]).abs() * 0.05 / 0.025 < 1.0);
-        }
+        assert!(program.least_slack(&disturbed) > 0.0);
         assert_eq!((disturbed.fields[0][1], disturbed.poses.len()), (0.0, 41));
         assert!(disturbed.poses[20].position.z.abs() > 1e-3);
+    }
+
+    /// A belt of strips (length, in-plane curvature) and bends (angle) between clamps.
+    fn board(strips: &[(f64, f64)], bend: f64) -> BeltProgram {
+        let mut pieces = Vec::new();
+        for (i, (length, geodesic)) in strips.iter().enumerate() {
+            if i > 0 {
+                pieces.push(Piece::Joint { angle: bend });
+            }
+            let element = Element {
+                length: length / 40.0,
+                geodesic: *geodesic,
+                rigidity: [1.0; 2],
+                half_width: 0.05,
+                curl: Curl::default(),
+            };
+            pieces.extend([Piece::Strip(element); 40]);
+        }
+        let mut supports = vec![
+            held(0, [0.0; 3], Some([0.0; 3])),
+            held(pieces.len(), [0.0, 0.4, 0.0], Some([0.0; 3])),
+        ];
+        for support in &mut supports {
+            support.square_rib = true;
+        }
+        BeltProgram::new(pieces, EnergyModel::Wunderlich).with_supports(supports)
+    }
+
+    #[test]
+    fn test_start_has_no_ribs_that_cross_whatever_the_board() {
+        let boards = [
+            board(&[(0.5, 0.0), (0.5, 0.0)], 1.57),
+            board(&[(0.4, 0.0), (0.2, 0.0), (0.4, 0.0)], -2.0),
+            board(&[(0.5, 0.0), (0.5, 0.0)], 2.09),
+            board(&[(0.45, 0.0), (0.02, 60.0), (0.53, 0.0)], 0.0),
+            board(&[(1.0, 12.0)], 0.0),
+        ];
+        for program in boards {
+            let start = guess(&program, &Vector3::x());
+            assert!(program.least_slack(&start) > 0.05);
+            assert!(program.least_slack(&disturb(&program, &start, 0.4)) > 0.0);
+        }
+    }
+
+    #[test]
+    fn test_ribs_of_a_gentle_arc_start_square() {
+        let slopes = calm_slopes(&board(&[(1.0, 1.4)], 0.0));
+        assert!(slopes.iter().all(|slope| slope.abs() < 1e-5));
     }
 }

@@ -41,4 +41,5 @@ pub mod ritz;
 pub mod scenario;
 pub mod solver;
 pub mod spine;
+pub mod strip;
 pub mod surface;

@@ -1,37 +1,68 @@
-//! The constrained minimisation: energy of a chain of elements under the supports' conditions, Eq. (34)–(36).
+//! The constrained minimisation: energy of a chain of pieces under supports, links and loads, Eq. (34)–(36).
 //!
-//! Poses are not unknowns of their own: they are carried from the start along the elements, so every point of the
-//! search is a belt without a break, and the supports' conditions are the only equations left.
+//! Poses are not unknowns of their own: they are carried from the start along the pieces, so every point of the
+//! search is a belt without a break, and the conditions of supports and links are the only equations left. In the same
+//! way the rib slope is carried across a bend of the board, where the rib is one material line.
 
-use crate::element::{Element, IncrementJet};
+mod load;
+mod support;
+
+pub use load::{DeadForce, NodeLoad};
+pub use support::{Hold, NodeSupport};
+
+use crate::element::{Element, IncrementJet, Jet};
 use crate::energy::EnergyModel;
 use crate::lie::{Pose, hat};
-use crate::solver::chain::{NodeMatrix, NodeVector, Stage};
-use crate::solver::{Linearisation, Program, Rows, RowsByNode, Values};
-use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector2, Vector3, Vector4};
+use crate::solver::chain::{NodeVector, Stage};
+use crate::solver::{Bounds, Linearisation, Program, Rows, RowsByNode, Values};
+use crate::spine::turn;
+use nalgebra::{Matrix3, Matrix4, Rotation3, Vector2, Vector3, Vector4};
 
-/// Conditions at one node.
-#[derive(Debug, Clone, PartialEq)]
-pub struct NodeSupport {
-    /// Which node.
-    pub node: usize,
-    /// Prescribed position, Eq. (35), each component or none.
-    pub position: [Option<f64>; 3],
-    /// Prescribed frame, Eq. (36), or none.
-    pub frame: Option<UnitQuaternion<f64>>,
-    /// Whether the rib is square there, β = 0.
-    pub square_rib: bool,
+/// What joins a node to the next.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Piece {
+    /// A flexible element.
+    Strip(Element),
+    /// A stiffened stretch.
+    Rigid {
+        /// Length along the spine.
+        length: f64,
+    },
+    /// A place of no length where the bend may jump, and the board turn.
+    Joint {
+        /// Angle χ by which the board turns, from η towards ζ.
+        angle: f64,
+    },
+}
+
+/// Conditions between two nodes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NodeLink {
+    /// The two nodes.
+    pub nodes: [usize; 2],
+    /// From the first one's position to the second one's, Eq. (35).
+    pub offset: Vector3<f64>,
+    /// Factors by which bend and slope of the second are those of the first, where they are tied at all.
+    pub fields: [Option<f64>; 2],
 }
 
 /// The programme of a belt. Lengths are in U and energies in mean R_f/U.
 #[derive(Debug, Clone)]
 pub struct BeltProgram {
-    /// Elements in order along the spine.
-    pub elements: Vec<Element>,
+    /// Pieces in order along the spine.
+    pub pieces: Vec<Piece>,
     /// Bending energy.
     pub model: EnergyModel,
-    /// Supports by rising node.
+    /// Supports.
     pub supports: Vec<NodeSupport>,
+    /// Links.
+    pub links: Vec<NodeLink>,
+    /// Dead forces at nodes.
+    pub loads: Vec<NodeLoad>,
+    /// Weight per unit length, world axes.
+    pub weight: Vector3<f64>,
+    /// Bend and rib slope of every node where they are prescribed.
+    fixed: Vec<[Option<f64>; 2]>,
 }
 
 /// A shape of the belt.
@@ -43,127 +74,202 @@ pub struct BeltPoint {
     pub poses: Vec<Pose>,
 }
 
-/// What acts on a node from beyond: derivative of the supports' work by the node's position and frame.
+/// What acts on a node from beyond: derivative of all work by the node's position and frame.
 #[derive(Debug, Clone, Copy)]
 struct Adjoint {
     force: Vector3<f64>,
     moment: Vector3<f64>,
 }
 
-/// The rotation from the prescribed frame to the present one as modified Rodrigues parameters `4 tan(θ/4) axis`, with
-/// derivatives by the body rotation.
-///
-/// Like the rotation vector near zero, and zero at no other rotation. Unlike the rotation vector and the skew part of
-/// the matrix they have regular derivatives up to and at a half-turn, where the shorter of the two turns changes side.
-#[derive(Debug, Clone, Copy)]
-struct RotationGap {
-    scalar: f64,
-    vector: Vector3<f64>,
-}
-
-impl RotationGap {
-    fn new(prescribed: &UnitQuaternion<f64>, frame: &Matrix3<f64>) -> Self {
-        let now = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(*frame));
-        let gap = prescribed.conjugate() * now;
-        let sign = if gap.w < 0.0 { -1.0 } else { 1.0 };
-        Self {
-            scalar: sign * gap.w,
-            vector: sign * gap.imag(),
+impl Piece {
+    /// Length along the spine.
+    pub fn length(&self) -> f64 {
+        match self {
+            Self::Strip(element) => element.length,
+            Self::Rigid { length } => *length,
+            Self::Joint { .. } => 0.0,
         }
     }
 
-    fn value(&self) -> Vector3<f64> {
-        4.0 * self.vector / (1.0 + self.scalar)
-    }
-
-    fn jacobian(&self) -> Matrix3<f64> {
-        let denominator = 1.0 + self.scalar;
-        let by_rotation = self.scalar * Matrix3::identity() + hat(&self.vector);
-        2.0 / denominator * by_rotation
-            + 2.0 / (denominator * denominator) * self.vector * self.vector.transpose()
-    }
-
-    /// Second derivative of `weights · value`.
-    fn hessian(&self, weights: &Vector3<f64>) -> Matrix3<f64> {
-        let denominator = 1.0 + self.scalar;
-        let numerator = weights.dot(&self.vector);
-        let numerator_by = 0.5 * (self.scalar * weights + weights.cross(&self.vector));
-        let denominator_by = -0.5 * self.vector;
-        let mixed = numerator_by * denominator_by.transpose();
-        let isotropic = -0.25 * numerator / denominator
-            + 0.25 * numerator * self.scalar / (denominator * denominator);
-        4.0 * (isotropic * Matrix3::identity() - (mixed + mixed.transpose()) / denominator.powi(2)
-            + 2.0 * numerator / denominator.powi(3) * denominator_by * denominator_by.transpose())
+    /// The motion along it.
+    fn motion(&self, fields: &Vector4<f64>) -> Pose {
+        match self {
+            Self::Strip(element) => element.increment(fields),
+            Self::Rigid { length } => Pose {
+                position: Vector3::y() * *length,
+                ..Pose::identity()
+            },
+            Self::Joint { angle } => turn(*angle),
+        }
     }
 }
 
-impl NodeSupport {
-    /// The prescribed position, where all of it is.
-    pub fn point(&self) -> Option<Vector3<f64>> {
-        let [x, y, z] = self.position;
-        Some(Vector3::new(x?, y?, z?))
-    }
+/// The rib slope beyond a bend of the board by χ, with two derivatives; `None` where the rib would leave through the
+/// bend: a rib there is one material line, α⁺ = α⁻ − χ.
+pub fn slope_beyond(slope: f64, angle: f64) -> Option<[f64; 3]> {
+    let (sine, cosine) = angle.sin_cos();
+    let denominator = cosine + slope * sine;
+    (denominator > 0.0).then(|| {
+        [
+            (slope * cosine - sine) / denominator,
+            denominator.powi(-2),
+            -2.0 * sine * denominator.powi(-3),
+        ]
+    })
+}
 
-    fn rotation(&self, pose: &Pose) -> Option<RotationGap> {
-        self.frame
-            .as_ref()
-            .map(|frame| RotationGap::new(frame, &pose.frame))
-    }
-
-    fn value(&self, pose: &Pose, fields: &Vector2<f64>) -> Rows {
+impl NodeLink {
+    fn value(&self, point: &BeltPoint) -> Rows {
+        let [a, b] = self.nodes;
         let mut rows = Rows::zeros();
-        for (i, held) in self.position.iter().enumerate() {
-            rows[i] = held.map_or(0.0, |held| pose.position[i] - held);
-        }
-        if let Some(gap) = self.rotation(pose) {
-            rows.fixed_rows_mut::<3>(3).copy_from(&gap.value());
-        }
-        if self.square_rib {
-            rows[6] = fields[1];
+        let gap = point.poses[b].position - point.poses[a].position - self.offset;
+        rows.fixed_rows_mut::<3>(0).copy_from(&gap);
+        for (i, factor) in self.fields.iter().enumerate() {
+            rows[3 + i] = factor.map_or(0.0, |f| point.fields[b][i] - f * point.fields[a][i]);
         }
         rows
     }
 
-    fn jacobian(&self, pose: &Pose) -> RowsByNode {
-        let mut rows = RowsByNode::zeros();
-        for (i, held) in self.position.iter().enumerate() {
-            rows[(i, i)] = if held.is_some() { 1.0 } else { 0.0 };
+    fn jacobian(&self) -> [RowsByNode; 2] {
+        let mut by = [RowsByNode::zeros(); 2];
+        for i in 0..3 {
+            (by[0][(i, i)], by[1][(i, i)]) = (-1.0, 1.0);
         }
-        if let Some(gap) = self.rotation(pose) {
-            rows.fixed_view_mut::<3, 3>(3, 3).copy_from(&gap.jacobian());
+        for (i, factor) in self.fields.iter().enumerate() {
+            if let Some(factor) = factor {
+                (by[0][(3 + i, 6 + i)], by[1][(3 + i, 6 + i)]) = (-factor, 1.0);
+            }
         }
-        if self.square_rib {
-            rows[(6, 7)] = 1.0;
-        }
-        rows
-    }
-
-    /// Second derivative of `multipliers · value` by the node's unknowns.
-    fn hessian(&self, pose: &Pose, multipliers: &Rows) -> NodeMatrix {
-        let mut hessian = NodeMatrix::zeros();
-        if let Some(gap) = self.rotation(pose) {
-            let weights = multipliers.fixed_rows::<3>(3).into_owned();
-            hessian
-                .fixed_view_mut::<3, 3>(3, 3)
-                .copy_from(&gap.hessian(&weights));
-        }
-        hessian
-    }
-
-    /// Force and moment of the support on the belt, world axes.
-    fn reaction(&self, pose: &Pose, multipliers: &Rows) -> (Vector3<f64>, Vector3<f64>) {
-        let pull = self.jacobian(pose).tr_mul(multipliers);
-        (
-            -pull.fixed_rows::<3>(0),
-            -(pose.frame * pull.fixed_rows::<3>(3)),
-        )
+        by
     }
 }
 
 impl BeltProgram {
-    /// The four unknowns of an element.
-    fn fields_of(fields: &[Vector2<f64>], element: usize) -> Vector4<f64> {
-        let [a, b] = [fields[element], fields[element + 1]];
+    /// The programme of a chain of pieces that nothing holds or loads.
+    pub fn new(pieces: Vec<Piece>, model: EnergyModel) -> Self {
+        let nodes = pieces.len() + 1;
+        Self {
+            pieces,
+            model,
+            supports: Vec::new(),
+            links: Vec::new(),
+            loads: Vec::new(),
+            weight: Vector3::zeros(),
+            fixed: vec![[None; 2]; nodes],
+        }
+        .with_supports(Vec::new())
+    }
+
+    /// The same with these supports in place of its own.
+    pub fn with_supports(mut self, supports: Vec<NodeSupport>) -> Self {
+        let nodes = self.pieces.len() + 1;
+        self.fixed = (0..nodes).map(|node| self.fixed_by_pieces(node)).collect();
+        for support in supports.iter().filter(|support| support.square_rib) {
+            self.fixed[support.node][1].get_or_insert(0.0);
+        }
+        self.supports = supports;
+        self.fix_across_joints();
+        self
+    }
+
+    /// What a stiffened stretch prescribes at a node: no bend inside, square ribs at its ends too.
+    fn fixed_by_pieces(&self, node: usize) -> [Option<f64>; 2] {
+        let beside = [node.checked_sub(1), Some(node)];
+        let pieces = beside
+            .into_iter()
+            .flatten()
+            .filter_map(|k| self.pieces.get(k));
+        let is_rigid = |piece: &&Piece| matches!(piece, Piece::Rigid { .. });
+        match pieces.clone().any(|piece| is_rigid(&piece)) {
+            true => [Some(0.0); 2],
+            false => [None; 2],
+        }
+    }
+
+    /// Where the rib is prescribed on one side of a joint, so it is on the other.
+    fn fix_across_joints(&mut self) {
+        for (k, piece) in self.pieces.iter().enumerate() {
+            let Piece::Joint { angle } = *piece else {
+                continue;
+            };
+            let across = |slope: Option<f64>, angle| Some(slope_beyond(slope?, angle)?[0]);
+            let [before, after] = [self.fixed[k][1], self.fixed[k + 1][1]];
+            self.fixed[k][1] = before.or(across(after, -angle));
+            self.fixed[k + 1][1] = after.or(across(before, angle));
+        }
+    }
+
+    /// Whether bend and slope of a node are unknowns, and not prescribed or carried on from the node before.
+    fn free(&self, node: usize) -> [bool; 2] {
+        let [bend, slope] = self.fixed[node].map(|fixed| fixed.is_none());
+        [bend, slope && !self.is_tied(node)]
+    }
+
+    /// Whether the slope of a node is carried on from the node before.
+    fn is_tied(&self, node: usize) -> bool {
+        let joint = node
+            .checked_sub(1)
+            .is_some_and(|k| matches!(self.pieces[k], Piece::Joint { .. }));
+        joint && self.fixed[node][1].is_none()
+    }
+
+    /// The slope carried on to a node across a joint, with derivatives.
+    fn carried_slope(&self, point: &BeltPoint, node: usize) -> Option<[f64; 3]> {
+        match self.pieces[node - 1] {
+            Piece::Joint { angle } => slope_beyond(point.fields[node - 1][1], angle),
+            Piece::Strip(_) | Piece::Rigid { .. } => None,
+        }
+    }
+
+    /// Gives a point the fields that are prescribed or carried on, and its poses.
+    ///
+    /// A rib that would leave through a bend of the board is left as it is.
+    pub fn settle(&self, point: &mut BeltPoint) {
+        for node in 0..point.fields.len() {
+            for (i, fixed) in self.fixed[node].iter().enumerate() {
+                if let Some(fixed) = fixed {
+                    point.fields[node][i] = *fixed;
+                }
+            }
+            if self.is_tied(node)
+                && let Some([slope, ..]) = self.carried_slope(point, node)
+            {
+                point.fields[node][1] = slope;
+            }
+        }
+        self.carry(point);
+    }
+
+    /// The least of how far the ribs are from crossing; negative infinity where one would leave through a bend.
+    pub fn least_slack(&self, point: &BeltPoint) -> f64 {
+        let leaves = |node| self.is_tied(node) && self.carried_slope(point, node).is_none();
+        if (1..point.fields.len()).any(leaves) {
+            return f64::NEG_INFINITY;
+        }
+        self.elements()
+            .flat_map(|(k, element)| element.slacks(&Self::fields_of(&point.fields, k)))
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    /// The rib slope of a node, where it is prescribed.
+    pub fn fixed_slope(&self, node: usize) -> Option<f64> {
+        self.fixed[node][1]
+    }
+
+    /// The elements that bend, each with its number among the pieces.
+    pub fn elements(&self) -> impl Iterator<Item = (usize, &Element)> {
+        self.pieces
+            .iter()
+            .enumerate()
+            .filter_map(|(k, piece)| match piece {
+                Piece::Strip(element) => Some((k, element)),
+                Piece::Rigid { .. } | Piece::Joint { .. } => None,
+            })
+    }
+
+    /// The four unknowns of a piece.
+    fn fields_of(fields: &[Vector2<f64>], piece: usize) -> Vector4<f64> {
+        let [a, b] = [fields[piece], fields[piece + 1]];
         Vector4::new(a[0], a[1], b[0], b[1])
     }
 
@@ -171,56 +277,92 @@ impl BeltProgram {
     pub fn nodes(&self) -> Vec<f64> {
         let mut u = 0.0;
         let mut nodes = vec![u];
-        for element in &self.elements {
-            u += element.length;
+        for piece in &self.pieces {
+            u += piece.length();
             nodes.push(u);
         }
-        nodes[self.elements.len()] = 1.0;
+        nodes[self.pieces.len()] = 1.0;
         nodes
     }
 
     /// Bending energy of a shape.
-    pub fn energy(&self, fields: &[Vector2<f64>]) -> f64 {
-        self.elements
-            .iter()
-            .enumerate()
+    pub fn elastic_energy(&self, fields: &[Vector2<f64>]) -> f64 {
+        self.elements()
             .map(|(k, element)| element.energy(self.model, &Self::fields_of(fields, k)))
             .sum()
     }
 
+    /// Potential of weight and loads.
+    pub fn load_potential(&self, poses: &[Pose]) -> f64 {
+        let loads = self.loads.iter();
+        let dead: f64 = loads
+            .map(|load| load.load.potential(&poses[load.node]))
+            .sum();
+        let weight = |(k, piece): (usize, &Piece)| {
+            let ends = load::weight(&self.weight, piece.length());
+            ends[0].potential(&poses[k]) + ends[1].potential(&poses[k + 1])
+        };
+        match self.is_weightless() {
+            true => dead,
+            false => dead + self.pieces.iter().enumerate().map(weight).sum::<f64>(),
+        }
+    }
+
+    fn is_weightless(&self) -> bool {
+        self.weight == Vector3::zeros()
+    }
+
     /// Carries the poses on from the first, Eq. (3).
     pub fn carry(&self, point: &mut BeltPoint) {
-        for (k, element) in self.elements.iter().enumerate() {
-            let increment = element.increment(&Self::fields_of(&point.fields, k));
-            point.poses[k + 1] = point.poses[k] * increment;
+        for (k, piece) in self.pieces.iter().enumerate() {
+            let motion = piece.motion(&Self::fields_of(&point.fields, k));
+            point.poses[k + 1] = point.poses[k] * motion;
+        }
+    }
+
+    /// Adds the derivatives of everything that acts at single nodes.
+    fn add_pulls(&self, point: &BeltPoint, multipliers: &[Rows], into: &mut [NodeVector]) {
+        let (at_nodes, between) = multipliers.split_at(self.supports.len());
+        for (support, rows) in self.supports.iter().zip(at_nodes) {
+            into[support.node] += support.jacobian(&point.poses[support.node]).tr_mul(rows);
+        }
+        for (link, rows) in self.links.iter().zip(between) {
+            for (node, by_node) in link.nodes.iter().zip(link.jacobian()) {
+                into[*node] += by_node.tr_mul(rows);
+            }
+        }
+        for NodeLoad { node, load } in &self.loads {
+            let (force, moment) = load.pull(&point.poses[*node]);
+            let mut state = into[*node].fixed_rows_mut::<3>(0);
+            state += force;
+            let mut state = into[*node].fixed_rows_mut::<3>(3);
+            state += moment;
         }
     }
 
     /// Force and moment at every node, world axes: what the belt beyond does to the part before; at the last node,
-    /// what its support does.
+    /// what holds and loads it.
     pub fn internal(
         &self,
         point: &BeltPoint,
         multipliers: &[Rows],
     ) -> Vec<(Vector3<f64>, Vector3<f64>)> {
-        let last = self.elements.len();
+        let last = self.pieces.len();
+        let mut pulls = vec![NodeVector::zeros(); last + 1];
+        self.add_pulls(point, multipliers, &mut pulls);
         let mut adjoint = Adjoint::zero();
         let mut internal = vec![(Vector3::zeros(), Vector3::zeros()); last + 1];
-        for k in (0..=last).rev() {
-            let frame = &point.poses[k].frame;
-            if k < last {
-                let increment = self.elements[k].increment(&Self::fields_of(&point.fields, k));
-                adjoint = adjoint.before(frame, &increment);
-                internal[k] = adjoint.on_part_before(frame);
-            }
-            for (support, rows) in self.supports.iter().zip(multipliers) {
-                if support.node == k {
-                    adjoint.add(&support.jacobian(&point.poses[k]).tr_mul(rows));
-                }
-            }
-            if k == last {
-                internal[k] = adjoint.on_part_before(frame);
-            }
+        adjoint.add(&pulls[last]);
+        internal[last] = adjoint.on_part_before(&point.poses[last].frame);
+        for (k, piece) in self.pieces.iter().enumerate().rev() {
+            let pose = &point.poses[k];
+            let [first, second] = load::weight(&self.weight, piece.length());
+            adjoint.add_load(&second, &point.poses[k + 1]);
+            let motion = piece.motion(&Self::fields_of(&point.fields, k));
+            adjoint = adjoint.before(&pose.frame, &motion);
+            adjoint.add_load(&first, pose);
+            internal[k] = adjoint.on_part_before(&pose.frame);
+            adjoint.add(&pulls[k]);
         }
         internal
     }
@@ -235,6 +377,14 @@ impl BeltProgram {
             .iter()
             .zip(multipliers)
             .map(|(support, rows)| support.reaction(&point.poses[support.node], rows))
+            .collect()
+    }
+
+    /// Force of every link on its second node, world axes; on the first it is the opposite.
+    pub fn link_forces(&self, multipliers: &[Rows]) -> Vec<Vector3<f64>> {
+        multipliers[self.supports.len()..]
+            .iter()
+            .map(|rows| -rows.fixed_rows::<3>(0).into_owned())
             .collect()
     }
 }
@@ -252,12 +402,18 @@ impl Adjoint {
         self.moment += by_node.fixed_rows::<3>(3);
     }
 
-    /// The same derivative by the pose at the element's first node.
-    fn before(&self, frame: &Matrix3<f64>, increment: &Pose) -> Self {
+    fn add_load(&mut self, load: &DeadForce, pose: &Pose) {
+        let (force, moment) = load.pull(pose);
+        self.force += force;
+        self.moment += moment;
+    }
+
+    /// The same derivative by the pose at the piece's first node.
+    fn before(&self, frame: &Matrix3<f64>, motion: &Pose) -> Self {
         let force = frame.tr_mul(&self.force);
         Self {
             force: self.force,
-            moment: increment.frame * self.moment + increment.position.cross(&force),
+            moment: motion.frame * self.moment + motion.position.cross(&force),
         }
     }
 
@@ -271,67 +427,86 @@ impl Program for BeltProgram {
     type Point = BeltPoint;
 
     fn stages(&self) -> usize {
-        self.elements.len()
+        self.pieces.len()
     }
 
     fn constrained_nodes(&self) -> Vec<usize> {
         self.supports.iter().map(|support| support.node).collect()
     }
 
+    fn linked_nodes(&self) -> Vec<[usize; 2]> {
+        self.links.iter().map(|link| link.nodes).collect()
+    }
+
     fn weights(&self) -> Vec<f64> {
-        self.elements.iter().map(|element| element.length).collect()
+        let weight = |piece: &Piece| match piece {
+            Piece::Strip(element) => element.length,
+            Piece::Rigid { .. } | Piece::Joint { .. } => 0.0,
+        };
+        self.pieces.iter().map(weight).collect()
     }
 
     fn evaluate(&self, point: &mut BeltPoint, values: &mut Values) -> bool {
         values.slacks.clear();
-        for (k, element) in self.elements.iter().enumerate() {
-            let share = element.rib_share(&Self::fields_of(&point.fields, k));
-            values.slacks.push([1.0 - share, 1.0 + share]);
+        for (k, piece) in self.pieces.iter().enumerate() {
+            values.slacks.push(match piece {
+                Piece::Strip(element) => element.slacks(&Self::fields_of(&point.fields, k)),
+                Piece::Rigid { .. } | Piece::Joint { .. } => [1.0; 2],
+            });
+            if self.is_tied(k + 1) && self.carried_slope(point, k + 1).is_none() {
+                return false;
+            }
         }
         if !values.slacks.iter().flatten().all(|slack| *slack > 0.0) {
             return false;
         }
         self.carry(point);
-        values.objective = self.energy(&point.fields);
+        values.objective = self.elastic_energy(&point.fields) + self.load_potential(&point.poses);
         values.constraints.clear();
-        values.constraints.extend(
-            self.supports
-                .iter()
-                .map(|s| s.value(&point.poses[s.node], &point.fields[s.node])),
-        );
+        let supports = self.supports.iter();
+        values
+            .constraints
+            .extend(supports.map(|s| s.value(&point.poses[s.node])));
+        let links = self.links.iter();
+        values
+            .constraints
+            .extend(links.map(|link| link.value(point)));
         values.objective.is_finite()
     }
 
-    fn linearise(&self, point: &BeltPoint, multipliers: &[Rows], into: &mut Linearisation) {
-        for node in &mut into.gradient {
-            node.fill(0.0);
-        }
+    fn linearise(
+        &self,
+        point: &BeltPoint,
+        multipliers: &[Rows],
+        bounds: &Bounds,
+        into: &mut Linearisation,
+    ) {
+        into.gradient.fill(NodeVector::zeros());
+        self.add_pulls(point, multipliers, &mut into.gradient);
+        into.chain.first_free = self.free(0);
+        into.chain.last_state.fill(0.0);
         let mut adjoint = Adjoint::zero();
-        let mut supports = self.supports.iter().enumerate().rev().peekable();
-        for k in (0..=self.elements.len()).rev() {
-            if k < self.elements.len() {
-                let fields = Self::fields_of(&point.fields, k);
-                let jet = self.elements[k].increment_jet(&fields);
-                self.linearise_stage(k, point, &jet, &adjoint, into);
-                adjoint = adjoint.before(&point.poses[k].frame, &jet.value);
+        for k in (0..=self.pieces.len()).rev() {
+            if k < self.pieces.len() {
+                self.linearise_piece(k, point, bounds, &mut adjoint, into);
             }
-            while let Some((i, support)) = supports.next_if(|(_, support)| support.node == k) {
-                let pose = &point.poses[k];
-                into.constraints[i] = support.jacobian(pose);
-                let pull = into.constraints[i].tr_mul(&multipliers[i]);
-                adjoint.add(&pull);
-                into.gradient[k][7] += pull[7];
-                into.chain.nodes[i].hessian = support.hessian(pose, &multipliers[i]);
-            }
+            adjoint.add(&into.gradient[k]);
+            into.gradient[k].fixed_rows_mut::<6>(0).fill(0.0);
         }
         let mut start = into.gradient[0].fixed_rows_mut::<6>(0);
         start.fixed_rows_mut::<3>(0).copy_from(&adjoint.force);
         start.fixed_rows_mut::<3>(3).copy_from(&adjoint.moment);
+        self.linearise_conditions(point, multipliers, into);
     }
 
     fn retract(&self, point: &BeltPoint, step: &[NodeVector], length: f64, into: &mut BeltPoint) {
-        for (k, fields) in into.fields.iter_mut().enumerate() {
-            *fields = point.fields[k] + length * step[k].fixed_rows::<2>(6);
+        for (k, step) in step.iter().enumerate() {
+            into.fields[k] = point.fields[k] + length * step.fixed_rows::<2>(6);
+            if self.is_tied(k)
+                && let Some([slope, ..]) = self.carried_slope(into, k)
+            {
+                into.fields[k][1] = slope;
+            }
         }
         let turn = Rotation3::new(length * step[0].fixed_rows::<3>(3));
         into.poses[0] = Pose {
@@ -342,65 +517,167 @@ impl Program for BeltProgram {
 }
 
 impl BeltProgram {
-    /// Derivatives of one element, with what acts on its second node from beyond.
-    fn linearise_stage(
+    /// Derivatives of one piece, with what acts on its second node from beyond; moves that to the first node.
+    fn linearise_piece(
         &self,
         k: usize,
         point: &BeltPoint,
-        jet: &IncrementJet,
-        beyond: &Adjoint,
+        bounds: &Bounds,
+        adjoint: &mut Adjoint,
         into: &mut Linearisation,
     ) {
-        let element = &self.elements[k];
+        let [first, second] = load::weight(&self.weight, self.pieces[k].length());
+        if !self.is_weightless() {
+            adjoint.add_load(&second, &point.poses[k + 1]);
+            add_state(into, k + 1, &second.hessian(&point.poses[k + 1]));
+        }
+        let pose = &point.poses[k];
+        let motion = match &self.pieces[k] {
+            Piece::Strip(element) => {
+                self.linearise_element(k, element, point, &bounds[k], adjoint, into)
+            }
+            piece @ (Piece::Rigid { .. } | Piece::Joint { .. }) => {
+                let motion = piece.motion(&Vector4::zeros());
+                let force = pose.frame.tr_mul(&adjoint.force);
+                into.chain.stages[k] = carry_state(&pose.frame, &motion, &force);
+                into.slacks[k] = [Vector4::zeros(); 2];
+                motion
+            }
+        };
+        into.chain.stages[k].free = self.free(k + 1);
+        if self.is_tied(k + 1) {
+            self.linearise_tie(k, point, bounds, into);
+        }
+        *adjoint = adjoint.before(&pose.frame, &motion);
+        if !self.is_weightless() {
+            adjoint.add_load(&first, pose);
+            add_state(into, k, &first.hessian(pose));
+        }
+    }
+
+    /// Derivatives of one element; the motion along it.
+    fn linearise_element(
+        &self,
+        k: usize,
+        element: &Element,
+        point: &BeltPoint,
+        bounds: &[f64; 2],
+        beyond: &Adjoint,
+        into: &mut Linearisation,
+    ) -> Pose {
         let fields = Self::fields_of(&point.fields, k);
         let frame = &point.poses[k].frame;
+        let jet = element.increment_jet(&fields);
         let force = frame.tr_mul(&beyond.force);
         let energy = element.energy_jet(self.model, &fields);
-        let controls = energy.hessian + element.increment_hessian(jet, &force, &beyond.moment);
+        let slacks: [Jet; 2] = element.slack_jets(&fields);
+        let mut controls = energy.hessian + element.increment_hessian(&jet, &force, &beyond.moment);
+        if element.geodesic != 0.0 {
+            for (slack, multiplier) in slacks.iter().zip(bounds) {
+                controls -= *multiplier * slack.hessian;
+            }
+        }
         let gradient = energy.gradient
             + jet.position_by_fields.tr_mul(&force)
             + jet.rotation_by_fields.tr_mul(&beyond.moment);
-        into.chain.stages[k] = carry_derivatives(frame, jet, &force, &beyond.moment, controls);
-        let share = element.rib_share_gradient();
-        into.slacks[k] = [-share, share];
+        let mut stage = carry_state(frame, &jet.value, &force);
+        carry_controls(&mut stage, frame, &jet, &force, &beyond.moment, controls);
+        into.chain.stages[k] = stage;
+        into.slacks[k] = slacks.map(|slack| slack.gradient);
         for (node, rows) in [(k, 0), (k + 1, 2)] {
             let mut part = into.gradient[node].fixed_rows_mut::<2>(6);
             part += gradient.fixed_rows::<2>(rows);
         }
+        jet.value
+    }
+
+    /// How the slope is carried on across a joint, and what that bends of all that depends on it.
+    fn linearise_tie(
+        &self,
+        k: usize,
+        point: &BeltPoint,
+        bounds: &Bounds,
+        into: &mut Linearisation,
+    ) {
+        let Some([_, first, second]) = self.carried_slope(point, k + 1) else {
+            return;
+        };
+        let mut pull = into.gradient[k + 1][7];
+        if let Some(slacks) = into.slacks.get(k + 1) {
+            for (slack, multiplier) in slacks.iter().zip(&bounds[k + 1]) {
+                pull -= multiplier * slack[1];
+            }
+        }
+        let stage = &mut into.chain.stages[k];
+        stage.tie = Vector2::new(0.0, first);
+        stage.controls[(1, 1)] += second * pull;
+    }
+
+    /// Derivatives of supports, links and loads at their nodes, second ones by their states.
+    fn linearise_conditions(
+        &self,
+        point: &BeltPoint,
+        multipliers: &[Rows],
+        into: &mut Linearisation,
+    ) {
+        for (i, support) in self.supports.iter().enumerate() {
+            let pose = &point.poses[support.node];
+            into.constraints[i] = support.jacobian(pose);
+            into.chain.nodes[i].hessian = support.hessian(pose, &multipliers[i]);
+        }
+        for (link, rows) in self.links.iter().zip(&mut into.links) {
+            *rows = link.jacobian();
+        }
+        for NodeLoad { node, load } in &self.loads {
+            add_state(into, *node, &load.hessian(&point.poses[*node]));
+        }
     }
 }
 
-/// How an element carries the pose on, and the second derivatives of the work done at its second node: `force` in the
-/// axes of the first node's frame, `moment` in those of the second's.
-fn carry_derivatives(
-    frame: &Matrix3<f64>,
-    jet: &IncrementJet,
-    force: &Vector3<f64>,
-    moment: &Vector3<f64>,
-    controls: nalgebra::Matrix4<f64>,
-) -> Stage {
-    let (p, turn) = (&jet.value.position, &jet.value.frame);
+/// Adds a second derivative by the rotation of a node to the stage that starts there.
+fn add_state(into: &mut Linearisation, node: usize, hessian: &Matrix3<f64>) {
+    let state = match into.chain.stages.get_mut(node) {
+        Some(stage) => &mut stage.state_state,
+        None => &mut into.chain.last_state,
+    };
+    let mut rotation = state.fixed_view_mut::<3, 3>(3, 3);
+    rotation += hessian;
+}
+
+/// How a motion carries the pose on, and the second derivatives of the work done at its far end by `force`, in the axes
+/// of the frame it starts from.
+fn carry_state(frame: &Matrix3<f64>, motion: &Pose, force: &Vector3<f64>) -> Stage {
+    let p = &motion.position;
     let mut stage = Stage::zero();
-    stage
-        .state_by_state
-        .fixed_view_mut::<3, 3>(0, 0)
-        .fill_with_identity();
-    stage
-        .state_by_state
+    let carried = &mut stage.state_by_state;
+    carried.fixed_view_mut::<3, 3>(0, 0).fill_with_identity();
+    carried
         .fixed_view_mut::<3, 3>(0, 3)
         .copy_from(&(-frame * hat(p)));
-    stage
-        .state_by_state
+    carried
         .fixed_view_mut::<3, 3>(3, 3)
-        .copy_from(&turn.transpose());
-    let by_position = frame * jet.position_by_fields;
+        .copy_from(&motion.frame.transpose());
     let outer = 0.5 * (p * force.transpose() + force * p.transpose());
     stage
         .state_state
         .fixed_view_mut::<3, 3>(3, 3)
         .copy_from(&(outer - force.dot(p) * Matrix3::identity()));
-    let mixed =
-        -hat(force) * jet.position_by_fields - 0.5 * turn * hat(moment) * jet.rotation_by_fields;
+    stage
+}
+
+/// How the fields of an element carry the pose on, and the second derivatives of the work done at its second node:
+/// `force` in the axes of the first node's frame, `moment` in those of the second's.
+fn carry_controls(
+    stage: &mut Stage,
+    frame: &Matrix3<f64>,
+    jet: &IncrementJet,
+    force: &Vector3<f64>,
+    moment: &Vector3<f64>,
+    controls: Matrix4<f64>,
+) {
+    let by_position = frame * jet.position_by_fields;
+    let mixed = -hat(force) * jet.position_by_fields
+        - 0.5 * jet.value.frame * hat(moment) * jet.rotation_by_fields;
     for (columns, carried, second) in [
         (0, &mut stage.state_by_first, &mut stage.state_first),
         (2, &mut stage.state_by_second, &mut stage.state_second),
@@ -416,75 +693,124 @@ fn carry_derivatives(
             .copy_from(&mixed.fixed_columns::<2>(columns));
     }
     stage.controls = controls;
-    stage
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::energy::Curl;
+    use nalgebra::UnitQuaternion;
 
+    fn element(length: f64, geodesic: f64) -> Piece {
+        Piece::Strip(Element {
+            length,
+            geodesic,
+            rigidity: [1.0, 1.2],
+            half_width: 0.05,
+            curl: Curl {
+                bend: 0.8,
+                poisson: 0.3,
+            },
+        })
+    }
+
+    /// A belt with one of everything: a straight stretch, a bend, an arc, a stiffener, a joint, a hinge, a link, weight
+    /// and a dead force with a lever.
     fn program() -> BeltProgram {
-        let n = 6;
-        BeltProgram {
-            elements: vec![
-                Element {
-                    length: 1.0 / n as f64,
-                    geodesic: 0.0,
-                    rigidity: [1.0, 1.2],
-                    half_width: 0.05
-                };
-                n
-            ],
-            model: EnergyModel::Wunderlich,
-            supports: vec![
-                NodeSupport {
-                    node: 0,
-                    position: [Some(0.0); 3],
-                    frame: Some(UnitQuaternion::identity()),
-                    square_rib: true,
+        let pieces = vec![
+            element(0.2, 0.0),
+            Piece::Joint { angle: 0.6 },
+            element(0.15, 1.5),
+            element(0.15, 1.5),
+            Piece::Joint { angle: 0.0 },
+            Piece::Rigid { length: 0.1 },
+            Piece::Joint { angle: 0.0 },
+            element(0.2, 0.0),
+            element(0.2, 0.0),
+        ];
+        let supports = vec![
+            NodeSupport {
+                node: 0,
+                position: [Some(0.0); 3],
+                hold: Hold::Frame(UnitQuaternion::identity()),
+                square_rib: true,
+            },
+            NodeSupport {
+                node: 3,
+                position: [None, Some(0.2), None],
+                hold: Hold::Hinge {
+                    frame: UnitQuaternion::from_scaled_axis(Vector3::new(0.4, 0.2, -0.1)),
+                    axis: 2,
                 },
-                NodeSupport {
-                    node: n,
-                    position: [Some(0.1), Some(0.6), Some(0.2)],
-                    frame: Some(UnitQuaternion::from_scaled_axis(Vector3::new(
-                        0.3, -0.4, 0.7,
-                    ))),
-                    square_rib: true,
-                },
-            ],
-        }
+                square_rib: false,
+            },
+            NodeSupport {
+                node: 9,
+                position: [Some(0.1), Some(0.6), Some(0.2)],
+                hold: Hold::Frame(UnitQuaternion::from_scaled_axis(Vector3::new(
+                    0.3, -0.4, 0.7,
+                ))),
+                square_rib: false,
+            },
+        ];
+        let mut program = BeltProgram::new(pieces, EnergyModel::Wunderlich).with_supports(supports);
+        program.links = vec![NodeLink {
+            nodes: [1, 8],
+            offset: Vector3::new(0.1, 0.2, 0.3),
+            fields: [Some(-1.0), None],
+        }];
+        program.loads = vec![NodeLoad {
+            node: 4,
+            load: DeadForce {
+                force: Vector3::new(1.0, -2.0, 0.5),
+                lever: Vector3::new(0.1, 0.2, -0.1),
+            },
+        }];
+        program.weight = Vector3::new(2.0, 1.0, -3.0);
+        program
     }
 
     fn point(program: &BeltProgram) -> BeltPoint {
-        let n = program.elements.len();
+        let nodes = program.nodes();
         let mut point = BeltPoint {
-            fields: (0..=n)
-                .map(|k| {
-                    let u = k as f64 / n as f64;
-                    Vector2::new(3.0 * (7.0 * u).cos() + 1.0, 0.4 * (5.0 * u).sin() + 0.1)
-                })
+            fields: nodes
+                .iter()
+                .map(|u| Vector2::new(3.0 * (7.0 * u).cos() + 1.0, 0.4 * (5.0 * u).sin() + 0.1))
                 .collect(),
-            poses: vec![Pose::identity(); n + 1],
+            poses: vec![Pose::identity(); nodes.len()],
         };
         point.poses[0].frame = Rotation3::new(Vector3::new(0.2, 0.1, -0.3)).into_inner();
-        program.carry(&mut point);
+        program.settle(&mut point);
         point
     }
 
-    fn lagrangian(program: &BeltProgram, point: &mut BeltPoint, multipliers: &[Rows]) -> f64 {
+    /// What the solver's linearisation is the second-order expansion of.
+    fn lagrangian(
+        program: &BeltProgram,
+        point: &mut BeltPoint,
+        multipliers: &[Rows],
+        bounds: &Bounds,
+    ) -> f64 {
         let mut values = Values::default();
         assert!(program.evaluate(point, &mut values));
-        values.objective
-            + values
-                .constraints
-                .iter()
-                .zip(multipliers)
-                .map(|(c, l)| c.dot(l))
-                .sum::<f64>()
+        let constraints: f64 = values
+            .constraints
+            .iter()
+            .zip(multipliers)
+            .map(|(c, l)| c.dot(l))
+            .sum();
+        let slacks: f64 = values
+            .slacks
+            .iter()
+            .flatten()
+            .zip(bounds.iter().flatten())
+            .map(|(slack, multiplier)| slack * multiplier)
+            .sum();
+        values.objective + constraints - slacks
     }
 
     fn moved(program: &BeltProgram, point: &BeltPoint, steps: &[(usize, usize, f64)]) -> BeltPoint {
-        let mut step = vec![NodeVector::zeros(); program.elements.len() + 1];
+        let mut step = vec![NodeVector::zeros(); program.pieces.len() + 1];
         for (node, entry, size) in steps {
             step[*node][*entry] += size;
         }
@@ -493,33 +819,43 @@ mod tests {
         into
     }
 
-    /// Unknowns: the start's state, then both fields of every node.
+    /// The start's state, then the free fields of every node.
     fn unknowns(program: &BeltProgram) -> Vec<(usize, usize)> {
-        (0..6)
-            .map(|i| (0, i))
-            .chain((0..=program.elements.len()).flat_map(|k| [(k, 6), (k, 7)]))
-            .collect()
+        let fields = (0..=program.pieces.len()).flat_map(|k| {
+            let free = program.free(k);
+            (0..2).filter(move |i| free[*i]).map(move |i| (k, 6 + i))
+        });
+        (0..6).map(|i| (0, i)).chain(fields).collect()
     }
 
     #[test]
     fn test_gradient_and_hessian_agree_with_finite_differences() {
         let program = program();
         let at = point(&program);
-        let multipliers = [
-            Rows::from_fn(|i, _| 0.7 - 0.3 * i as f64),
-            Rows::from_fn(|i, _| 3.0 - 1.1 * i as f64),
-        ];
-        let mut linear =
-            crate::solver::Linearisation::new(program.elements.len(), &[0, program.elements.len()]);
-        program.linearise(&at, &multipliers, &mut linear);
+        let multipliers: Vec<Rows> = (0..4)
+            .map(|k| Rows::from_fn(|i, _| 0.7 + 0.6 * f64::from(k) - 0.4 * i as f64))
+            .collect();
+        let bounds: Bounds = (0..9).map(|k| [0.3 + 0.1 * f64::from(k), 0.5]).collect();
+        let mut linear = Linearisation::new(&program);
+        program.linearise(&at, &multipliers, &bounds, &mut linear);
+        let mut gradient = linear.gradient.clone();
+        for (k, slacks) in linear.slacks.iter().enumerate() {
+            for (slack, multiplier) in slacks.iter().zip(bounds[k]) {
+                for (i, by) in (-multiplier * slack).iter().enumerate() {
+                    gradient[k + i / 2][6 + i % 2] += by;
+                }
+            }
+        }
+        linear.chain.fold(&mut gradient);
         let unknowns = unknowns(&program);
         let h = 1e-4;
         let value = |steps: &[(usize, usize, f64)]| {
-            lagrangian(&program, &mut moved(&program, &at, steps), &multipliers)
+            let mut point = moved(&program, &at, steps);
+            lagrangian(&program, &mut point, &multipliers, &bounds)
         };
         for a in &unknowns {
             let difference = (value(&[(a.0, a.1, h)]) - value(&[(a.0, a.1, -h)])) / (2.0 * h);
-            let exact = linear.gradient[a.0][a.1];
+            let exact = gradient[a.0][a.1];
             assert!(
                 (difference - exact).abs() < 2e-6 * exact.abs().max(10.0),
                 "{a:?} {difference} {exact}"
@@ -536,6 +872,48 @@ mod tests {
                     "{a:?} {b:?} {second} {exact}"
                 );
             }
+        }
+    }
+
+    #[test]
+    fn test_rib_at_a_bend_is_one_material_line() {
+        for (slope, angle) in [(0.3f64, 0.5f64), (-0.2, -1.2), (1.5, 2.0)] {
+            let [beyond, first, _] = slope_beyond(slope, angle).unwrap();
+            assert!((beyond.atan() - (slope.atan() - angle)).abs() < 1e-14);
+            assert!((slope_beyond(beyond, -angle).unwrap()[0] - slope).abs() < 1e-14);
+            let h = 1e-6;
+            let at = |by: f64| slope_beyond(slope + by, angle).unwrap();
+            assert!(((at(h)[0] - at(-h)[0]) / (2.0 * h) - first).abs() < 1e-6 * first);
+            assert!(((at(h)[1] - at(-h)[1]) / (2.0 * h) - at(0.0)[2]).abs() < 1e-5 * first.powi(2));
+        }
+        assert_eq!(slope_beyond(0.0, 1.6), None);
+    }
+
+    #[test]
+    fn test_ribs_beside_a_stiffener_are_square_and_nothing_bends_in_it() {
+        let program = program();
+        let point = point(&program);
+        assert_eq!((point.fields[4][1], point.fields[7][1]), (0.0, 0.0));
+        assert_eq!(
+            (point.fields[5], point.fields[6]),
+            (Vector2::zeros(), Vector2::zeros())
+        );
+        let along = point.poses[6].position - point.poses[5].position;
+        assert!((along - 0.1 * point.poses[5].frame.column(1)).norm() < 1e-15);
+    }
+
+    #[test]
+    fn test_weight_beyond_is_carried_by_the_internal_force() {
+        let program = BeltProgram {
+            supports: Vec::new(),
+            links: Vec::new(),
+            loads: Vec::new(),
+            ..program()
+        };
+        let point = point(&program);
+        let nodes = program.nodes();
+        for (u, (force, _)) in nodes.iter().zip(program.internal(&point, &[])) {
+            assert!((force - (1.0 - u) * program.weight).norm() < 1e-14);
         }
     }
 }

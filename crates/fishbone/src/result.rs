@@ -1,7 +1,7 @@
 //! The result schema `fishbone.result/1`: an equilibrium as it is written to JSON.
 
 use crate::energy::EnergyModel;
-use crate::equilibrium::{Equilibrium, Status, Wrench};
+use crate::equilibrium::{Equilibrium, LinkForce, Status, Wrench};
 use crate::scenario::Scenario;
 use crate::surface;
 use nalgebra::{Matrix3, Vector3};
@@ -36,7 +36,7 @@ pub struct Record<'a> {
     edges: Edges,
     internal: Internal,
     supports: Vec<Support>,
-    links: [Point; 0],
+    links: Vec<Link>,
     highest_point: HighestPoint,
     least_bend_radius: LeastBendRadius,
     least_spine_radius: LeastSpineRadius,
@@ -67,6 +67,19 @@ struct Support {
     at: f64,
     force: Point,
     moment: Point,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct Link {
+    force: Point,
+}
+
+impl Link {
+    fn new(link: &LinkForce) -> Self {
+        Self {
+            force: link.force.into(),
+        }
+    }
 }
 
 #[derive(Debug, Clone, Serialize)]
@@ -140,7 +153,7 @@ impl<'a> Record<'a> {
             edges: Edges::new(&surface::edges(spine)),
             internal: Internal::new(&equilibrium.internal),
             supports: equilibrium.reactions.iter().map(Support::new).collect(),
-            links: [],
+            links: equilibrium.links.iter().map(Link::new).collect(),
             highest_point: HighestPoint {
                 u: highest.u,
                 position: highest.position.into(),

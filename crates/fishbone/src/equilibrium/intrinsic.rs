@@ -1,14 +1,15 @@
 //! The intrinsic method: the interior-point search in the two fields bend and rib slope.
 
+use super::assembly::Assembly;
 use super::search::Search;
-use super::{Equilibrium, Reaction, Status, Units, Wrench, excess_distance, is_taut};
+use super::{Equilibrium, LinkForce, Reaction, Status, Units, Wrench, excess_distance, is_taut};
 use crate::belt::Belt;
 use crate::lie::Pose;
-use crate::program::{BeltPoint, BeltProgram, NodeSupport};
+use crate::program::{self, BeltPoint, BeltProgram};
 use crate::scenario::{Scenario, SupportSpec};
 use crate::solver::{Curvature, Outcome, Solution};
 use crate::spine::{Piece, Spine};
-use nalgebra::{Rotation3, UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 use std::ops::ControlFlow;
 
 /// Finds a minimum of the energy in the two fields.
@@ -18,88 +19,47 @@ pub(super) fn solve(
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Equilibrium {
     let units = Units::of(belt);
-    let mesh = |count| program(scenario, belt, count);
-    let program = mesh(scenario.elements());
+    let assembly = Assembly::new(scenario, belt);
+    let program = assembly.program(scenario.elements());
     let search = Search {
         bulge: Vector3::from(scenario.solver.bulge),
         tolerance: scenario.solver.tolerance,
     };
+    let finer = scenario.elements() > scenario.default_elements();
+    let coarse = finer.then(|| assembly.program(scenario.default_elements()));
     let excess = excess_distance(scenario, units.length);
     let solution = match excess {
         Some(_) => search.start(&program),
-        None => search.run(&mesh, &program, scenario.default_elements(), proceed),
+        None => search.run(&program, coarse.as_ref(), proceed),
     };
     let (status, message) = match excess {
         Some(message) => (Status::Infeasible, message),
         None => judge(&solution, search.tolerance),
     };
-    let energy = solution.values.objective * units.energy;
-    let spine = units.spine(&program, &solution.point, belt.width, &origin(scenario));
-    let internal = program.internal(&solution.point, &solution.multipliers);
     let stable = stable(status, solution.curvature);
+    let spine = units.spine(&program, &solution.point, belt, &assembly.origin);
+    let internal = program.internal(&solution.point, &solution.multipliers);
+    let links = program.link_forces(&solution.multipliers).into_iter();
     Equilibrium {
         status,
         message,
         warnings: warnings(scenario, &program, is_taut(scenario, units.length), stable),
-        energy,
-        elastic_energy: energy,
+        energy: solution.values.objective * units.energy + assembly.potential_of_origin(),
+        elastic_energy: program.elastic_energy(&solution.point.fields) * units.energy,
         torsion: spine.torsion(),
         spine,
         internal: internal.into_iter().map(|w| units.wrench(w)).collect(),
         reactions: reactions(scenario, &program, &solution, units),
+        links: links
+            .take(scenario.links.len())
+            .map(|force| LinkForce {
+                force: force * units.force(),
+            })
+            .collect(),
         stable,
         residuals: solution.residuals,
         iterations: solution.iterations,
         scenario: scenario.clone(),
-    }
-}
-
-/// The programme of a scenario with so many elements, lengths in U and energy in mean R_f/U.
-fn program(scenario: &Scenario, belt: &Belt, count: usize) -> BeltProgram {
-    let elements = belt.elements(count);
-    let last = elements.len();
-    let origin = origin(scenario);
-    let mut supports: Vec<NodeSupport> = scenario
-        .supports
-        .iter()
-        .map(|support| node_support(support, &origin, belt.length(), last))
-        .collect();
-    if supports.is_empty() {
-        supports.push(NodeSupport {
-            node: 0,
-            position: [Some(0.0); 3],
-            frame: Some(UnitQuaternion::identity()),
-            square_rib: false,
-        });
-    }
-    BeltProgram {
-        elements,
-        model: scenario.energy,
-        supports,
-    }
-}
-
-/// Where the programme has its origin, so that a belt far from the world's loses no digits: at the first support.
-fn origin(scenario: &Scenario) -> Vector3<f64> {
-    let first = |i: usize| scenario.supports.iter().find_map(|s| s.components()[i]);
-    Vector3::from([0, 1, 2].map(|i| first(i).unwrap_or(0.0)))
-}
-
-/// The conditions of a support at one of the two ends.
-fn node_support(
-    support: &SupportSpec,
-    origin: &Vector3<f64>,
-    length: f64,
-    last: usize,
-) -> NodeSupport {
-    let at_start = support.at.arc_length(length) < 0.5 * length;
-    let quaternion =
-        |frame| UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(frame));
-    NodeSupport {
-        node: if at_start { 0 } else { last },
-        position: [0, 1, 2].map(|i| Some((support.components()[i]? - origin[i]) / length)),
-        frame: support.frame().map(quaternion),
-        square_rib: support.is_square_rib(length),
     }
 }
 
@@ -156,9 +116,8 @@ fn warnings(
     // Strong twist makes facets of the scale of V, which longer elements cannot resolve.
     const SAFE: f64 = 8.0;
     let shares = program
-        .elements
-        .iter()
-        .map(|e| e.length / (2.0 * e.half_width));
+        .elements()
+        .map(|(_, e)| e.length / (2.0 * e.half_width));
     let longest = shares.fold(0.0, f64::max);
     let coarse = longest * SAFE > 1.0 + 1e-9;
     let saddle = stable == Some(false);
@@ -171,7 +130,7 @@ fn warnings(
         coarse.then(|| {
             format!(
                 "elements of {longest:.2} V may settle on a false level: V/8 is safe, so raise solver.elements to {:.0}",
-                (SAFE * longest * program.elements.len() as f64).ceil()
+                (SAFE * longest * program.elements().count() as f64).ceil()
             )
         }),
         taut.then(|| {
@@ -204,20 +163,28 @@ fn stable(status: Status, curvature: Curvature) -> Option<bool> {
     }
 }
 
+/// The supports' own forces; at the start of a closed belt with those that bring its end back.
 fn reactions(
     scenario: &Scenario,
     program: &BeltProgram,
     solution: &Solution<BeltPoint>,
     units: Units,
 ) -> Vec<Reaction> {
-    let wrenches = program.reactions(&solution.point, &solution.multipliers);
-    scenario
-        .supports
-        .iter()
-        .zip(wrenches)
+    let mut wrenches: Vec<_> = program
+        .reactions(&solution.point, &solution.multipliers)
+        .into_iter()
+        .map(|wrench| units.wrench(wrench))
+        .collect();
+    if scenario.belt.closed
+        && let (Some(end), Some(start)) = (wrenches.pop(), wrenches.first_mut())
+    {
+        start.moment += end.moment;
+    }
+    let supports = scenario.supports.iter().zip(wrenches);
+    supports
         .map(|(support, wrench)| Reaction {
             at: support.at.arc_length(units.length),
-            wrench: units.wrench(wrench),
+            wrench,
         })
         .collect()
 }
@@ -225,7 +192,7 @@ fn reactions(
 impl Units {
     fn wrench(&self, (force, moment): (Vector3<f64>, Vector3<f64>)) -> Wrench {
         Wrench {
-            force: force * self.energy / self.length,
+            force: force * self.force(),
             moment: moment * self.energy,
         }
     }
@@ -234,24 +201,25 @@ impl Units {
         &self,
         program: &BeltProgram,
         point: &BeltPoint,
-        width: f64,
+        belt: &Belt,
         origin: &Vector3<f64>,
     ) -> Spine {
         let pose = |pose: &Pose| Pose {
             frame: pose.frame,
             position: origin + pose.position * self.length,
         };
+        let piece = |piece: &program::Piece| match piece {
+            program::Piece::Strip(element) => Piece::Strip {
+                geodesic: element.geodesic / self.length,
+            },
+            program::Piece::Rigid { .. } => Piece::Rigid,
+            program::Piece::Joint { angle } => Piece::Joint { angle: *angle },
+        };
         let nodes = program.nodes();
         Spine {
-            width,
-            pieces: program
-                .elements
-                .iter()
-                .map(|element| Piece::Strip {
-                    geodesic: element.geodesic / self.length,
-                })
-                .collect(),
-            half_turns: None,
+            width: belt.width,
+            pieces: program.pieces.iter().map(piece).collect(),
+            half_turns: belt.half_turns,
             u: nodes.iter().map(|u| u * self.length).collect(),
             pose: point.poses.iter().map(pose).collect(),
             bend: point.fields.iter().map(|f| f[0] / self.length).collect(),

@@ -94,6 +94,7 @@ fn report(scenario: &Scenario, belt: &Belt, start: &Pose, solution: &Solution) -
         },
         internal: Vec::new(),
         reactions: Vec::new(),
+        links: Vec::new(),
         stable: None,
         residuals: Residuals {
             stationarity: solution.stationarity,

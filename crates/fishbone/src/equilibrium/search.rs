@@ -1,8 +1,9 @@
 //! The search for a minimum: where it starts, and where it starts again.
 
 use crate::energy::EnergyModel;
-use crate::guess::{disturb, guess};
-use crate::program::{BeltPoint, BeltProgram};
+use crate::guess::{disturb, guess, inside};
+use crate::program::{BeltPoint, BeltProgram, Piece};
+use crate::scenario::SAME_PLACE;
 use crate::solver::{self, Curvature, Outcome, Settings, Solution};
 use nalgebra::{Vector2, Vector3};
 use std::ops::ControlFlow;
@@ -37,30 +38,23 @@ impl Search {
         solver::minimise(program, &settings, start, &mut || ControlFlow::Continue(()))
     }
 
-    /// Solves on the mesh asked for; where it is finer than the default by way of the default one, so that refining a
-    /// mesh does not lead to another shape of the belt.
+    /// Solves on the mesh asked for; by way of a coarse one where there is one, so that refining a mesh does not lead to
+    /// another shape of the belt.
     pub(super) fn run(
         &self,
-        mesh: &dyn Fn(usize) -> BeltProgram,
         program: &BeltProgram,
-        default_elements: usize,
+        coarse: Option<&BeltProgram>,
         proceed: &mut Proceed,
     ) -> Solution<BeltPoint> {
-        if program.elements.len() <= default_elements {
+        let Some(coarse) = coarse else {
             return self.cold(program, proceed);
-        }
-        let coarse = mesh(default_elements);
-        let found = self.cold(&coarse, proceed);
+        };
+        let found = self.cold(coarse, proceed);
+        let fine = prolong(coarse, &found.point, program);
         if found.outcome == Outcome::Interrupted {
             // The shape still has to be one of the mesh asked for.
-            return self.minimise(
-                program,
-                prolong(&coarse, &found.point, program),
-                WARM,
-                &mut || ControlFlow::Break(()),
-            );
+            return self.minimise(program, fine, WARM, &mut || ControlFlow::Break(()));
         }
-        let fine = prolong(&coarse, &found.point, program);
         let refined = self
             .minimise(program, fine, WARM, proceed)
             .after(found.iterations);
@@ -102,13 +96,11 @@ impl Search {
         start: &BeltPoint,
         proceed: &mut Proceed,
     ) -> Solution<BeltPoint> {
-        let smooth = BeltProgram {
-            model: EnergyModel::Wunderlich,
-            ..program.clone()
-        };
+        let mut smooth = program.clone();
+        smooth.model = EnergyModel::Wunderlich;
         let found = self.minimise(&smooth, start.clone(), COLD, proceed);
         let iterations = found.iterations;
-        self.minimise(program, inside(found.point), WARM, proceed)
+        self.minimise(program, inside(program, found.point), WARM, proceed)
             .after(iterations)
     }
 
@@ -161,28 +153,35 @@ fn rank(solution: &Solution<BeltPoint>) -> u8 {
 
 /// The same shape on another mesh.
 fn prolong(from: &BeltProgram, point: &BeltPoint, to: &BeltProgram) -> BeltPoint {
-    let nodes = from.nodes();
-    let field = |u: f64| -> Vector2<f64> {
-        let next = nodes
-            .partition_point(|node| *node < u)
-            .clamp(1, nodes.len() - 1);
-        let share = (u - nodes[next - 1]) / (nodes[next] - nodes[next - 1]);
-        point.fields[next - 1].lerp(&point.fields[next], share.clamp(0.0, 1.0))
-    };
-    let fields: Vec<_> = to.nodes().into_iter().map(field).collect();
-    let mut prolonged = inside(BeltPoint {
+    let (nodes, known) = (to.nodes(), from.nodes());
+    let after_joint = |k: usize| k > 0 && matches!(to.pieces[k - 1], Piece::Joint { .. });
+    let places = nodes.iter().enumerate();
+    let fields: Vec<_> = places
+        .map(|(k, u)| fields_at(from, &known, point, *u, after_joint(k)))
+        .collect();
+    let prolonged = BeltPoint {
         poses: vec![point.poses[0]; fields.len()],
         fields,
-    });
-    to.carry(&mut prolonged);
-    prolonged
+    };
+    inside(to, prolonged)
 }
 
-/// The same shape with its ribs a little off the bound, where a barrier can start.
-fn inside(mut point: BeltPoint) -> BeltPoint {
-    const OFF: f64 = 0.999;
-    for fields in &mut point.fields {
-        fields[1] *= OFF;
+/// The fields at an arc length in U, before or after the jump where there is one.
+fn fields_at(
+    program: &BeltProgram,
+    nodes: &[f64],
+    point: &BeltPoint,
+    u: f64,
+    after: bool,
+) -> Vector2<f64> {
+    let last = nodes.len() - 1;
+    let next = nodes
+        .partition_point(|node| *node < u - SAME_PLACE)
+        .min(last);
+    if (nodes[next] - u).abs() <= SAME_PLACE || next == 0 {
+        let joint = matches!(program.pieces.get(next), Some(Piece::Joint { .. }));
+        return point.fields[if joint && after { next + 1 } else { next }];
     }
-    point
+    let share = (u - nodes[next - 1]) / (nodes[next] - nodes[next - 1]);
+    point.fields[next - 1].lerp(&point.fields[next], share.clamp(0.0, 1.0))
 }

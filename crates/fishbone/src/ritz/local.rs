@@ -2,7 +2,8 @@
 
 use super::Orientation;
 use super::basis::LOCALS;
-use crate::energy::EnergyModel;
+use crate::energy::{Curl, EnergyModel};
+use crate::strip::Across;
 use nalgebra::{Matrix3, SVector};
 use num_dual::DualNum;
 
@@ -51,7 +52,8 @@ pub(super) fn euler<D: Scalar>(q: &Local<D>) -> [D; 3] {
 /// Units: R_f/U².
 /// Source: Eq. (29), (34)
 pub(super) fn density<D: Scalar>(energy: EnergyModel, width: f64, q: &Local<D>) -> D {
-    energy.value(rates(q)[2], q[6], q[7] * (0.5 * width))
+    let across = Across::straight(q[7] * (0.5 * width));
+    energy.value(rates(q)[2], q[6], &Curl::default(), &across)
 }
 
 /// The three equations that hold where the orientation is the one prescribed.

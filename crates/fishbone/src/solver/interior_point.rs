@@ -57,11 +57,11 @@ struct Lengths {
 impl<'a, P: Program> State<'a, P> {
     fn new(program: &'a P, settings: Settings, mut point: P::Point) -> Self {
         let weights = program.weights();
-        let linear = Linearisation::new(program.stages(), &program.constrained_nodes());
-        let newton = Newton::new(&linear, &weights);
+        let linear = Linearisation::new(program);
+        let newton = Newton::new(&linear, program.linked_nodes(), &weights);
         let mut values = Values::default();
         program.evaluate(&mut point, &mut values);
-        let rows = vec![Rows::zeros(); linear.constraints.len()];
+        let rows = vec![Rows::zeros(); linear.constraints.len() + linear.links.len()];
         let bounds = vec![[0.0; BOUNDS]; weights.len()];
         let mut state = Self {
             program,
@@ -159,8 +159,12 @@ impl<'a, P: Program> State<'a, P> {
     }
 
     fn linearise(&mut self) {
-        self.program
-            .linearise(&self.point, &self.multipliers, &mut self.linear);
+        self.program.linearise(
+            &self.point,
+            &self.multipliers,
+            &self.bound_multipliers,
+            &mut self.linear,
+        );
     }
 
     /// Residuals of the conditions in which slack times multiplier is `barrier` times the stage's weight.
@@ -178,6 +182,7 @@ impl<'a, P: Program> State<'a, P> {
                 complementarity = larger(complementarity, product.abs());
             }
         }
+        self.linear.chain.fold(&mut self.gradient);
         Residuals {
             stationarity: largest(self.gradient.iter().flatten()),
             constraint: largest(self.values.constraints.iter().flatten()),
@@ -406,9 +411,15 @@ impl<'a, P: Program> State<'a, P> {
                 state_by_state: stage.state_by_state,
                 state_by_first: stage.state_by_first,
                 state_by_second: stage.state_by_second,
+                tie: stage.tie,
+                free: stage.free,
                 ..Stage::zero()
             };
         }
+        for term in &mut self.linear.chain.nodes {
+            term.hessian.fill(0.0);
+        }
+        self.linear.chain.last_state.fill(0.0);
         self.linear.gradient.fill(NodeVector::zeros());
         self.newton
             .assemble(&self.linear, &self.values, &self.bound_multipliers);
@@ -466,6 +477,8 @@ mod tests {
     struct Cart {
         goal: f64,
         steepest: f64,
+        /// The pair of nodes that are `goal` apart, in place of the last node's distance from the origin.
+        tied: Option<[usize; 2]>,
     }
 
     #[derive(Debug, Clone, PartialEq)]
@@ -500,6 +513,10 @@ mod tests {
             vec![0, STAGES]
         }
 
+        fn linked_nodes(&self) -> Vec<[usize; 2]> {
+            self.tied.iter().copied().collect()
+        }
+
         fn weights(&self) -> Vec<f64> {
             vec![SHARE; STAGES]
         }
@@ -514,18 +531,37 @@ mod tests {
                 let rate = self.rate(ride, k);
                 values.slacks.push([1.0 - rate, 1.0 + rate]);
             }
-            let mut held = [Rows::zeros(), Rows::zeros()];
+            let mut held = vec![Rows::zeros(); 2];
             held[0][0] = ride.position[0];
-            held[0][6] = ride.push[0][0];
-            held[1][0] = ride.position[STAGES] - self.goal;
-            values.constraints = held.to_vec();
+            held[0][1] = ride.push[0][0];
+            match self.tied {
+                None => held[1][0] = ride.position[STAGES] - self.goal,
+                Some([a, b]) => {
+                    let mut gap = Rows::zeros();
+                    gap[0] = ride.position[b] - ride.position[a] - self.goal;
+                    held.push(gap);
+                }
+            }
+            values.constraints = held;
             values.slacks.iter().flatten().all(|slack| *slack > 0.0)
         }
 
-        fn linearise(&self, ride: &Ride, multipliers: &[Rows], into: &mut Linearisation) {
+        fn linearise(
+            &self,
+            ride: &Ride,
+            multipliers: &[Rows],
+            _: &Bounds,
+            into: &mut Linearisation,
+        ) {
             into.gradient.fill(NodeVector::zeros());
-            let arrival = multipliers[1][0];
-            for k in 0..STAGES {
+            let pulls = |k: usize| match self.tied {
+                None if k == STAGES => multipliers[1][0],
+                Some([a, b]) => multipliers[2][0] * (f64::from(b == k) - f64::from(a == k)),
+                None => 0.0,
+            };
+            let mut beyond = 0.0;
+            for k in (0..STAGES).rev() {
+                beyond += pulls(k + 1);
                 let mean = 0.5 * (ride.push[k][0] + ride.push[k + 1][0]);
                 let stage = &mut into.chain.stages[k];
                 stage.state_by_state.fill_with_identity();
@@ -534,18 +570,22 @@ mod tests {
                 let by_mean = Vector4::new(0.5, 0.0, 0.5, 0.0);
                 stage.controls = SHARE * by_mean * by_mean.transpose();
                 stage.controls[(1, 1)] += SHARE;
-                let pull = SHARE * (mean + arrival) * by_mean;
+                let pull = SHARE * (mean + beyond) * by_mean;
                 add_controls(&mut into.gradient, k, &pull);
                 into.gradient[k][7] += SHARE * ride.push[k][1];
                 let by_rate = Vector4::new(-1.0, 0.0, 1.0, 0.0) / SHARE / self.steepest;
                 into.slacks[k] = [-by_rate, by_rate];
             }
-            into.gradient[0][0] = arrival + multipliers[0][0];
-            into.gradient[0][6] += multipliers[0][6];
+            into.gradient[0][0] = beyond + pulls(0) + multipliers[0][0];
+            into.gradient[0][6] += multipliers[0][1];
             into.constraints = vec![RowsByNode::zeros(); 2];
             into.constraints[0][(0, 0)] = 1.0;
-            into.constraints[0][(6, 6)] = 1.0;
-            into.constraints[1][(0, 0)] = 1.0;
+            into.constraints[0][(1, 6)] = 1.0;
+            into.constraints[1][(0, 0)] = f64::from(self.tied.is_none());
+            for rows in &mut into.links {
+                rows[0][(0, 0)] = -1.0;
+                rows[1][(0, 0)] = 1.0;
+            }
         }
 
         fn retract(&self, ride: &Ride, step: &[NodeVector], length: f64, into: &mut Ride) {
@@ -575,6 +615,7 @@ mod tests {
         let cart = Cart {
             goal: 1.0,
             steepest: 4.0,
+            tied: None,
         };
         let solution = solved(&cart);
         assert_eq!(solution.outcome, Outcome::Converged);
@@ -600,6 +641,7 @@ mod tests {
             solved(&Cart {
                 goal,
                 steepest: 4.0,
+                tied: None,
             })
         };
         let (below, here, above) = (least(0.999), least(1.0), least(1.001));
@@ -608,10 +650,31 @@ mod tests {
     }
 
     #[test]
+    fn test_tie_between_two_nodes_is_worth_the_constraint_it_replaces() {
+        let cart = |tied| Cart {
+            goal: 1.0,
+            steepest: 4.0,
+            tied,
+        };
+        let (held, tied) = (solved(&cart(None)), solved(&cart(Some([0, STAGES]))));
+        assert_eq!(tied.outcome, Outcome::Converged);
+        assert!((held.values.objective - tied.values.objective).abs() < 1e-9);
+        assert!((held.multipliers[1][0] - tied.multipliers[2][0]).abs() < 1e-6);
+        let inner = solved(&Cart {
+            goal: 0.5,
+            ..cart(Some([3, 6]))
+        });
+        let gap = inner.point.position[6] - inner.point.position[3];
+        assert_eq!(inner.outcome, Outcome::Converged);
+        assert!((gap - 0.5).abs() < 1e-9);
+    }
+
+    #[test]
     fn test_goal_out_of_reach_is_locally_infeasible() {
         let cart = Cart {
             goal: 10.0,
             steepest: 1.0,
+            tied: None,
         };
         let solution = solved(&cart);
         assert_ne!(solution.outcome, Outcome::Converged);
@@ -623,6 +686,7 @@ mod tests {
         let cart = Cart {
             goal: 1.0,
             steepest: 4.0,
+            tied: None,
         };
         let solution = minimise(&cart, &settings(), cart.start(), &mut || {
             ControlFlow::Break(())

@@ -1,10 +1,11 @@
 //! Primal–dual interior-point minimisation on a chain of nodes.
 //!
-//! A numerical library of its own: it knows nodes, the stages between them, constraints at nodes and inequalities at
-//! stages, and nothing of belts. Every iteration costs time linear in the length of the chain. The algorithm is that
+//! A numerical library of its own: it knows nodes, the stages between them, constraints at nodes and between pairs of
+//! nodes, inequalities at stages, and nothing of belts. Every iteration costs time linear in the length of the chain. The algorithm is that
 //! of A. Wächter and L. T. Biegler, "On the implementation of an interior-point filter line-search algorithm for
 //! large-scale nonlinear programming" (2006), on the stage-wise linear algebra of [`chain`].
 
+mod border;
 pub mod chain;
 mod filter;
 mod interior_point;
@@ -13,16 +14,16 @@ mod newton;
 pub use interior_point::minimise;
 
 use chain::{Chain, NodeMatrix, NodeTerm, NodeVector, Stage};
-use nalgebra::{SMatrix, SVector, Vector4};
+use nalgebra::{Matrix6, SMatrix, SVector, Vector4};
 
-/// Most equality constraints at one node.
-pub const ROWS: usize = 7;
+/// Most equality constraints at one node, or between one pair of nodes.
+pub const ROWS: usize = 6;
 /// Inequalities at one stage.
 pub const BOUNDS: usize = 2;
 
-/// Values or multipliers of the constraints of one node; unused rows are zero.
+/// Values or multipliers of the constraints of one node or pair; unused rows are zero.
 pub type Rows = SVector<f64, ROWS>;
-/// Derivative of the constraints of one node by its unknowns; unused rows are zero.
+/// Derivative of the constraints of one node or pair by a node's unknowns; unused rows are zero.
 pub type RowsByNode = SMatrix<f64, ROWS, 8>;
 /// Multipliers of the inequalities, or any other number for each of them, stage by stage.
 pub type Bounds = Vec<[f64; BOUNDS]>;
@@ -32,7 +33,7 @@ pub type Bounds = Vec<[f64; BOUNDS]>;
 pub struct Values {
     /// Objective.
     pub objective: f64,
-    /// Constraint values, one entry a constrained node.
+    /// Constraint values, one entry a constrained node, then one a linked pair.
     pub constraints: Vec<Rows>,
     /// Inequalities of every stage: admissible where positive.
     pub slacks: Bounds,
@@ -41,12 +42,14 @@ pub struct Values {
 /// A programme to second order at a point.
 #[derive(Debug, Clone)]
 pub struct Linearisation {
-    /// Second derivatives of the Lagrangian of the equalities.
+    /// Second derivatives of the Lagrangian of equalities and inequalities.
     pub chain: Chain,
     /// Gradient of the Lagrangian of the equalities, by the unknowns of every node.
     pub gradient: Vec<NodeVector>,
-    /// Constraint derivatives, one entry a constrained node.
+    /// Derivatives of the constraints at nodes, one entry a constrained node.
     pub constraints: Vec<RowsByNode>,
+    /// Derivatives of the constraints between pairs, by either node; they are linear.
+    pub links: Vec<[RowsByNode; 2]>,
     /// Derivatives of the inequalities by both controls of their stage.
     pub slacks: Vec<[Vector4<f64>; BOUNDS]>,
 }
@@ -65,14 +68,24 @@ pub trait Program {
     /// The constrained nodes, rising.
     fn constrained_nodes(&self) -> Vec<usize>;
 
+    /// The pairs of nodes that linear constraints tie together.
+    fn linked_nodes(&self) -> Vec<[usize; 2]>;
+
     /// The share of each stage in the whole, its weight in barrier and damping.
     fn weights(&self) -> Vec<f64>;
 
     /// Carries the states of a point along the chain and evaluates it; false outside the domain.
     fn evaluate(&self, point: &mut Self::Point, values: &mut Values) -> bool;
 
-    /// Derivatives at a point that has been evaluated, of the objective plus multipliers times constraints.
-    fn linearise(&self, point: &Self::Point, multipliers: &[Rows], into: &mut Linearisation);
+    /// Derivatives at a point that has been evaluated, of the objective plus multipliers times constraints; the second
+    /// ones with `bounds` times the inequalities taken off.
+    fn linearise(
+        &self,
+        point: &Self::Point,
+        multipliers: &[Rows],
+        bounds: &Bounds,
+        into: &mut Linearisation,
+    );
 
     /// Moves the unknowns of a point along a step; the states still have to be carried on.
     fn retract(
@@ -144,7 +157,7 @@ pub struct Solution<P> {
     pub point: P,
     /// Its values.
     pub values: Values,
-    /// Multipliers of the constraints.
+    /// Multipliers of the constraints, in the order of their values.
     pub multipliers: Vec<Rows>,
     /// Residuals there.
     pub residuals: Residuals,
@@ -178,19 +191,24 @@ pub enum Curvature {
 }
 
 impl Linearisation {
-    /// Room for a programme with these constrained nodes.
-    pub fn new(stages: usize, constrained_nodes: &[usize]) -> Self {
-        let term = |node: &usize| NodeTerm {
-            node: *node,
+    /// Room for the derivatives of a programme.
+    pub fn new<P: Program>(program: &P) -> Self {
+        let term = |node| NodeTerm {
+            node,
             hessian: NodeMatrix::zeros(),
         };
+        let stages = program.stages();
+        let nodes: Vec<_> = program.constrained_nodes().into_iter().map(term).collect();
         Self {
+            constraints: vec![RowsByNode::zeros(); nodes.len()],
+            links: vec![[RowsByNode::zeros(); 2]; program.linked_nodes().len()],
             chain: Chain {
                 stages: vec![Stage::zero(); stages],
-                nodes: constrained_nodes.iter().map(term).collect(),
+                nodes,
+                last_state: Matrix6::zeros(),
+                first_free: [true; 2],
             },
             gradient: vec![NodeVector::zeros(); stages + 1],
-            constraints: vec![RowsByNode::zeros(); constrained_nodes.len()],
             slacks: vec![[Vector4::zeros(); BOUNDS]; stages],
         }
     }

@@ -1,7 +1,8 @@
 //! The Newton system of a barrier problem: bounds eliminated, inertia controlled, constraints met exactly.
 
-use super::chain::{Chain, Factor, NodeVector, NotConvex};
-use super::{Bounds, Curvature, Linearisation, Rows, Values};
+use super::border::Border;
+use super::chain::{Chain, Factor, NodeVector, TooConcave};
+use super::{Bounds, Curvature, Linearisation, Rows, RowsByNode, Values};
 
 /// Compliance lent to the constraints so that the chain can be factorised without them; refinement takes it back.
 const COMPLIANCE: f64 = 1e-7;
@@ -12,6 +13,8 @@ const REFINEMENTS: usize = 2;
 pub(super) struct Newton {
     chain: Chain,
     factor: Factor,
+    links: Vec<[RowsByNode; 2]>,
+    border: Border,
     weights: Vec<f64>,
     node_weights: Vec<f64>,
     damping: f64,
@@ -24,13 +27,16 @@ pub(super) struct Newton {
 }
 
 impl Newton {
-    pub(super) fn new(linear: &Linearisation, weights: &[f64]) -> Self {
+    pub(super) fn new(linear: &Linearisation, pairs: Vec<[usize; 2]>, weights: &[f64]) -> Self {
         let nodes = weights.len() + 1;
         let half = |k: Option<usize>| k.and_then(|k| weights.get(k)).map_or(0.0, |w| 0.5 * w);
         let zeros = vec![NodeVector::zeros(); nodes];
         Self {
             chain: linear.chain.clone(),
             factor: Factor::new(weights.len()),
+            links: linear.links.clone(),
+            multiplier_step: vec![Rows::zeros(); linear.constraints.len() + pairs.len()],
+            border: Border::new(pairs, nodes),
             node_weights: (0..nodes)
                 .map(|k| half(k.checked_sub(1)) + half(Some(k)))
                 .collect(),
@@ -39,7 +45,6 @@ impl Newton {
             right: zeros.clone(),
             correction: zeros.clone(),
             step: zeros,
-            multiplier_step: vec![Rows::zeros(); linear.constraints.len()],
         }
     }
 
@@ -57,6 +62,9 @@ impl Newton {
         counts: impl Fn(f64, f64) -> bool,
     ) {
         self.chain.stages.copy_from_slice(&linear.chain.stages);
+        self.chain.last_state = linear.chain.last_state;
+        self.chain.first_free = linear.chain.first_free;
+        self.links.copy_from_slice(&linear.links);
         for (k, stage) in self.chain.stages.iter_mut().enumerate() {
             for (b, gradient) in linear.slacks[k].iter().enumerate() {
                 let (slack, multiplier) = (values.slacks[k][b], bounds[k][b]);
@@ -72,7 +80,7 @@ impl Newton {
     }
 
     /// Factorises with just enough damping to be convex on the tangent space of the constraints.
-    pub(super) fn factorise(&mut self) -> Result<(), NotConvex> {
+    pub(super) fn factorise(&mut self) -> Result<(), TooConcave> {
         const FIRST: f64 = 1e-4;
         const MOST: f64 = 1e12;
         if self.factorise_damped(0.0).is_ok() {
@@ -87,13 +95,22 @@ impl Newton {
             }
             damping *= if known { 8.0 } else { 100.0 };
         }
-        Err(NotConvex)
+        Err(TooConcave)
     }
 
     /// Factorises with a given damping of the controls per unit weight.
-    pub(super) fn factorise_damped(&mut self, damping: f64) -> Result<(), NotConvex> {
-        self.chain
-            .factorise(damping, &self.node_weights, &mut self.factor)
+    pub(super) fn factorise_damped(&mut self, damping: f64) -> Result<(), TooConcave> {
+        let most = self.border.rows();
+        let concave = self
+            .chain
+            .factorise(damping, &self.node_weights, most, &mut self.factor)?;
+        self.border.factorise(
+            &self.chain,
+            &mut self.factor,
+            &self.links,
+            COMPLIANCE,
+            concave,
+        )
     }
 
     /// Sign of the second variation: positive must hold with the doubtful bounds free, negative with them held, both
@@ -132,21 +149,23 @@ impl Newton {
         gradient: &[NodeVector],
         targets: &[Rows],
     ) {
+        let (at_nodes, between) = targets.split_at(linear.constraints.len());
         self.right.copy_from_slice(gradient);
         self.step.fill(NodeVector::zeros());
         self.multiplier_step.fill(Rows::zeros());
         for _ in 0..=REFINEMENTS {
-            for (i, target) in targets.iter().enumerate() {
+            for (i, target) in at_nodes.iter().enumerate() {
                 let pull =
                     linear.constraints[i].tr_mul(&self.missing(linear, i, target)) / COMPLIANCE;
                 self.right[self.chain.nodes[i].node] += pull;
             }
             self.chain
                 .solve(&mut self.factor, &self.right, &mut self.correction);
+            self.correct_links(linear, between);
             for (step, correction) in self.step.iter_mut().zip(&self.correction) {
                 *step += correction;
             }
-            for (i, target) in targets.iter().enumerate() {
+            for (i, target) in at_nodes.iter().enumerate() {
                 let force = self.missing(linear, i, target) / COMPLIANCE;
                 self.multiplier_step[i] += force;
             }
@@ -154,7 +173,27 @@ impl Newton {
         }
     }
 
-    /// What the step still misses of a target.
+    /// Bends the correction to the links.
+    fn correct_links(&mut self, linear: &Linearisation, targets: &[Rows]) {
+        if targets.is_empty() {
+            return;
+        }
+        let mut missing = self.border.changes(&linear.links, &self.step);
+        for (missing, target) in missing.iter_mut().zip(targets) {
+            *missing += target;
+        }
+        let forces = self
+            .border
+            .correct(&linear.links, &missing, &mut self.correction);
+        for (step, force) in self.multiplier_step[linear.constraints.len()..]
+            .iter_mut()
+            .zip(forces)
+        {
+            *step += force;
+        }
+    }
+
+    /// What the step still misses of a target at a node.
     fn missing(&self, linear: &Linearisation, i: usize, target: &Rows) -> Rows {
         linear.constraints[i] * self.step[self.chain.nodes[i].node] + target
     }
@@ -168,9 +207,15 @@ impl Newton {
 
     /// Change of the multipliers' work on the constraints along the step, to first order.
     pub(super) fn constraint_work(&self, linear: &Linearisation, multipliers: &[Rows]) -> f64 {
-        let work = |(i, rows): (usize, &Rows)| {
-            rows.dot(&(linear.constraints[i] * self.step[self.chain.nodes[i].node]))
-        };
-        multipliers.iter().enumerate().map(work).sum()
+        let at_node = |(i, rows): (usize, &RowsByNode)| rows * self.step[self.chain.nodes[i].node];
+        linear
+            .constraints
+            .iter()
+            .enumerate()
+            .map(at_node)
+            .chain(self.border.changes(&linear.links, &self.step))
+            .zip(multipliers)
+            .map(|(change, multipliers)| multipliers.dot(&change))
+            .sum()
     }
 }

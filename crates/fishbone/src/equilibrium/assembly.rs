@@ -1,0 +1,203 @@
+//! From a scenario to a programme: which node everything acts on, lengths in U and energy in mean R_f/U.
+
+use super::Units;
+use crate::belt::{Belt, Break};
+use crate::program::{BeltProgram, DeadForce, Hold, NodeLink, NodeLoad, NodeSupport};
+use crate::scenario::{Axis, Place, SAME_PLACE, Scenario, SupportSpec};
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+use std::f64::consts::PI;
+
+/// What a programme is assembled from.
+pub(super) struct Assembly<'a> {
+    scenario: &'a Scenario,
+    belt: &'a Belt,
+    units: Units,
+    /// Where the programme has its origin, so that a belt far from the world's loses no digits: at the first support.
+    pub(super) origin: Vector3<f64>,
+}
+
+impl<'a> Assembly<'a> {
+    pub(super) fn new(scenario: &'a Scenario, belt: &'a Belt) -> Self {
+        let first = |i: usize| scenario.supports.iter().find_map(|s| s.components()[i]);
+        Self {
+            scenario,
+            belt,
+            units: Units::of(belt),
+            origin: Vector3::from([0, 1, 2].map(|i| first(i).unwrap_or(0.0))),
+        }
+    }
+
+    /// The programme on a mesh of about `count` elements.
+    ///
+    /// Its supports are those of the scenario in their order, then what a closed belt needs; so are its links.
+    pub(super) fn program(&self, count: usize) -> BeltProgram {
+        let pieces = self.belt.pieces(count, &self.breaks());
+        let bare = BeltProgram::new(pieces, self.scenario.energy);
+        let places = Places::of(&bare);
+        let mut supports: Vec<_> = self
+            .scenario
+            .supports
+            .iter()
+            .map(|support| self.node_support(support, &places))
+            .collect();
+        if supports.is_empty() {
+            supports.push(at_rest());
+        }
+        let mut links = self.node_links(&places);
+        if let Some(half_turns) = self.belt.half_turns {
+            let turn = PI * f64::from(half_turns);
+            supports.push(self.closed_end(&supports[0], places.last(), turn));
+            links.push(self.seam(&places));
+        }
+        let mut program = bare.with_supports(supports);
+        program.links = links;
+        program.loads = self.node_loads(&places);
+        program.weight = self.weight();
+        program
+    }
+
+    /// What the potential of the loads lacks for its zero to be at the world's origin and not at the programme's.
+    pub(super) fn potential_of_origin(&self) -> f64 {
+        let gravity = Vector3::from(self.scenario.loads.gravity.unwrap_or_default());
+        let weight = gravity * self.belt.density * self.belt.length();
+        let forces = self.scenario.loads.points.iter();
+        let total = forces
+            .map(|load| Vector3::from(load.force))
+            .sum::<Vector3<f64>>()
+            + weight;
+        -total.dot(&self.origin)
+    }
+
+    /// Arc lengths that must be nodes.
+    fn breaks(&self) -> Vec<Break> {
+        let at = |place: &Place, jump| Break {
+            u: place.arc_length(self.units.length),
+            jump,
+        };
+        let supports = self.scenario.supports.iter();
+        let links = self.scenario.links.iter();
+        let loads = self.scenario.loads.points.iter();
+        supports
+            .map(|support| at(&support.at, support.frame().is_some()))
+            .chain(links.flat_map(|link| [at(&link.from, false), at(&link.to, false)]))
+            .chain(loads.map(|load| at(&load.at, load.lever != [0.0; 3])))
+            .collect()
+    }
+
+    fn node_support(&self, support: &SupportSpec, places: &Places) -> NodeSupport {
+        let length = self.units.length;
+        NodeSupport {
+            node: places.node(support.at.arc_length(length) / length),
+            position: [0, 1, 2].map(|i| Some((support.components()[i]? - self.origin[i]) / length)),
+            hold: hold(support),
+            square_rib: support.is_square_rib(length),
+        }
+    }
+
+    fn node_links(&self, places: &Places) -> Vec<NodeLink> {
+        let length = self.units.length;
+        let node = |place: &Place| places.node(place.arc_length(length) / length);
+        let links = self.scenario.links.iter();
+        links
+            .map(|link| NodeLink {
+                nodes: [node(&link.from), node(&link.to)],
+                offset: Vector3::from(link.offset) / length,
+                fields: [None; 2],
+            })
+            .collect()
+    }
+
+    fn node_loads(&self, places: &Places) -> Vec<NodeLoad> {
+        let length = self.units.length;
+        let loads = self.scenario.loads.points.iter();
+        loads
+            .map(|load| NodeLoad {
+                node: places.node(load.at.arc_length(length) / length),
+                load: DeadForce {
+                    force: Vector3::from(load.force) / self.units.force(),
+                    lever: Vector3::from(load.lever) / length,
+                },
+            })
+            .collect()
+    }
+
+    fn weight(&self) -> Vector3<f64> {
+        let gravity = Vector3::from(self.scenario.loads.gravity.unwrap_or_default());
+        gravity * (self.belt.density * self.units.length / self.units.force())
+    }
+
+    /// The frame in which a closed belt comes back to its start.
+    fn closed_end(&self, start: &NodeSupport, node: usize, turn: f64) -> NodeSupport {
+        let frame = start.hold.frame().unwrap_or_default();
+        let twist = UnitQuaternion::from_scaled_axis(turn * Vector3::y());
+        NodeSupport {
+            node,
+            position: [None; 3],
+            hold: Hold::Frame(frame * twist),
+            square_rib: false,
+        }
+    }
+
+    /// The place where a closed belt comes back to its start, and the fields with which it does.
+    fn seam(&self, places: &Places) -> NodeLink {
+        let sign = self.belt.seam_sign();
+        NodeLink {
+            nodes: [0, places.last()],
+            offset: Vector3::zeros(),
+            fields: self
+                .belt
+                .goes_on_through_seam()
+                .map(|goes_on| goes_on.then_some(sign)),
+        }
+    }
+}
+
+/// The start of a belt that nothing holds, in the natural pose.
+fn at_rest() -> NodeSupport {
+    NodeSupport {
+        node: 0,
+        position: [Some(0.0); 3],
+        hold: Hold::Frame(UnitQuaternion::identity()),
+        square_rib: false,
+    }
+}
+
+fn hold(support: &SupportSpec) -> Hold {
+    let quaternion = |frame: Matrix3<f64>| {
+        UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(frame))
+    };
+    match (support.frame().map(quaternion), support.hinge) {
+        (None, _) => Hold::Free,
+        (Some(frame), None) => Hold::Frame(frame),
+        (Some(frame), Some(axis)) => Hold::Hinge {
+            frame,
+            axis: match axis {
+                Axis::Xi => 0,
+                Axis::Eta => 1,
+                Axis::Zeta => 2,
+            },
+        },
+    }
+}
+
+/// Nodes by arc length.
+struct Places(Vec<f64>);
+
+impl Places {
+    fn of(program: &BeltProgram) -> Self {
+        Self(program.nodes())
+    }
+
+    fn last(&self) -> usize {
+        self.0.len() - 1
+    }
+
+    /// The node at an arc length in U; the one before the jump where there are two. At the end, the last.
+    fn node(&self, u: f64) -> usize {
+        if u >= 1.0 {
+            return self.last();
+        }
+        let after = self.0.partition_point(|node| *node < u - SAME_PLACE);
+        after.min(self.last())
+    }
+}

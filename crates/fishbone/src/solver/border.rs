@@ -1,0 +1,110 @@
+//! Constraints that tie pairs of nodes together: a border around the chain's factorisation.
+
+use super::chain::{Chain, Factor, NodeVector, TooConcave};
+use super::{ROWS, Rows, RowsByNode};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+
+/// The constraints between pairs of nodes, with what they need to be eliminated after the chain.
+#[derive(Debug, Clone)]
+pub(super) struct Border {
+    pairs: Vec<[usize; 2]>,
+    /// The chain's answer to a unit multiplier of every row.
+    answers: Vec<Vec<NodeVector>>,
+    inverse: DMatrix<f64>,
+    gradient: Vec<NodeVector>,
+}
+
+impl Border {
+    pub(super) fn new(pairs: Vec<[usize; 2]>, nodes: usize) -> Self {
+        let rows = ROWS * pairs.len();
+        Self {
+            pairs,
+            answers: vec![vec![NodeVector::zeros(); nodes]; rows],
+            inverse: DMatrix::zeros(rows, rows),
+            gradient: vec![NodeVector::zeros(); nodes],
+        }
+    }
+
+    /// Number of rows, used or not.
+    pub(super) fn rows(&self) -> usize {
+        self.answers.len()
+    }
+
+    /// Eliminates the rows, each with a compliance, after a chain that is concave in `concave` directions.
+    ///
+    /// Errors: [`TooConcave`] unless the rows hold all of these directions.
+    pub(super) fn factorise(
+        &mut self,
+        chain: &Chain,
+        factor: &mut Factor,
+        links: &[[RowsByNode; 2]],
+        compliance: f64,
+        concave: usize,
+    ) -> Result<(), TooConcave> {
+        if self.pairs.is_empty() {
+            return Ok(());
+        }
+        for row in 0..self.rows() {
+            self.gradient.fill(NodeVector::zeros());
+            let rows = &links[row / ROWS];
+            for (node, by_node) in self.pairs[row / ROWS].iter().zip(rows) {
+                self.gradient[*node] += by_node.row(row % ROWS).transpose();
+            }
+            chain.solve(factor, &self.gradient, &mut self.answers[row]);
+        }
+        let mut yielding = DMatrix::identity(self.rows(), self.rows()) * compliance;
+        for (column, answer) in self.answers.iter().enumerate() {
+            for (i, change) in self.changes(links, answer).into_iter().enumerate() {
+                for (j, value) in change.iter().enumerate() {
+                    yielding[(ROWS * i + j, column)] -= value;
+                }
+            }
+        }
+        let eigen = SymmetricEigen::new(0.5 * (&yielding + yielding.transpose()));
+        // With the rows held, the whole is as concave as the chain less the negative directions of what gives way.
+        let held = eigen
+            .eigenvalues
+            .iter()
+            .filter(|value| **value < 0.0)
+            .count();
+        if held != concave {
+            return Err(TooConcave);
+        }
+        self.inverse = &eigen.eigenvectors
+            * DMatrix::from_diagonal(&eigen.eigenvalues.map(|value| 1.0 / value))
+            * eigen.eigenvectors.transpose();
+        Ok(())
+    }
+
+    /// Adds to a step of the chain what the links take to change by `−missing` less what it brings already; the
+    /// multipliers of the rows.
+    pub(super) fn correct(
+        &self,
+        links: &[[RowsByNode; 2]],
+        missing: &[Rows],
+        step: &mut [NodeVector],
+    ) -> Vec<Rows> {
+        let mut left = DVector::zeros(self.rows());
+        for (i, change) in self.changes(links, step).into_iter().enumerate() {
+            left.fixed_rows_mut::<ROWS>(ROWS * i)
+                .copy_from(&(change + missing[i]));
+        }
+        let multipliers = &self.inverse * left;
+        for (answer, multiplier) in self.answers.iter().zip(&multipliers) {
+            for (node, change) in step.iter_mut().zip(answer) {
+                *node += *multiplier * change;
+            }
+        }
+        (0..self.pairs.len())
+            .map(|i| multipliers.fixed_rows::<ROWS>(ROWS * i).into_owned())
+            .collect()
+    }
+
+    /// Change of the rows of every pair along a step.
+    pub(super) fn changes(&self, links: &[[RowsByNode; 2]], step: &[NodeVector]) -> Vec<Rows> {
+        let change = |(pair, rows): (&[usize; 2], &[RowsByNode; 2])| {
+            rows[0] * step[pair[0]] + rows[1] * step[pair[1]]
+        };
+        self.pairs.iter().zip(links).map(change).collect()
+    }
+}
