@@ -3,7 +3,7 @@
 use crate::lie::{Pose, exp, log};
 use crate::program::{BeltPoint, BeltProgram, NodeSupport, Piece};
 use nalgebra::{Matrix3, UnitQuaternion, Vector2, Vector3};
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 
 /// Samples of the arch when its reach is measured.
 const SAMPLES: usize = 64;
@@ -61,6 +61,31 @@ pub(crate) fn guess(program: &BeltProgram, bulge: &Vector3<f64>) -> BeltPoint {
     let arch = fit_arch(program, &slopes, &frame, start, end, bulge);
     let mut point = arched(program, &arch, &slopes, &frame);
     place(&mut point, start, end);
+    point
+}
+
+/// The start for a closed belt before it is twisted: a ring or, of a curved board, a cone, on the side of the bulge.
+pub(crate) fn ring(program: &BeltProgram, bulge: &Vector3<f64>) -> BeltPoint {
+    let start = program.supports.first();
+    let frame = start_frame(program, start, None, bulge);
+    let side = if frame.column(0).dot(bulge) < 0.0 {
+        1.0
+    } else {
+        -1.0
+    };
+    let bend = side * (TAU * TAU - total_turn(program).powi(2)).max(0.0).sqrt();
+    let slopes = calm_slopes(program).into_iter();
+    let fields: Vec<_> = slopes.map(|slope| Vector2::new(bend, slope)).collect();
+    let pose = Pose {
+        frame,
+        position: Vector3::zeros(),
+    };
+    let mut point = BeltPoint {
+        poses: vec![pose; fields.len()],
+        fields,
+    };
+    program.settle(&mut point);
+    place(&mut point, start, None);
     point
 }
 
@@ -241,6 +266,30 @@ pub(crate) fn disturb(program: &BeltProgram, point: &BeltPoint, share: f64) -> B
             Vector2::new(0.0, *calm) + (1.0 - share) * (*fields - Vector2::new(0.0, *calm)) + sway;
     }
     inside(program, disturbed)
+}
+
+/// A flat belt bent to the side, with ribs all sloping one way: what a load in its plane may buckle it into.
+///
+/// In the flat state every slope of the ribs is as good as any other, so that small disturbances do not tell.
+pub(crate) fn buckle(program: &BeltProgram, point: &BeltPoint, slope: f64) -> BeltPoint {
+    const BEND: f64 = 1.0;
+    let mut buckled = point.clone();
+    let calm = calm_slopes(program);
+    let nodes = program.nodes();
+    let held: Vec<f64> = (0..nodes.len())
+        .filter(|node| program.fixed_slope(*node).is_some())
+        .map(|node| nodes[node])
+        .collect();
+    let steepest = program
+        .elements()
+        .map(|(_, element)| 0.5 / element.half_width)
+        .fold(f64::INFINITY, f64::min);
+    for ((fields, calm), u) in buckled.fields.iter_mut().zip(calm).zip(&nodes) {
+        let free = held.iter().map(|held| (held - u).abs());
+        let most = free.fold(f64::INFINITY, f64::min) * steepest;
+        *fields = Vector2::new(BEND * (1.0 - u), calm + slope.clamp(-most, most));
+    }
+    inside(program, buckled)
 }
 
 /// The same shape with its ribs a little off the bound, where a barrier can start.

@@ -16,7 +16,7 @@ use crate::lie::{Pose, hat};
 use crate::solver::chain::{NodeVector, Stage};
 use crate::solver::{Bounds, Linearisation, Program, Rows, RowsByNode, Values};
 use crate::spine::turn;
-use nalgebra::{Matrix3, Matrix4, Rotation3, Vector2, Vector3, Vector4};
+use nalgebra::{Matrix3, Matrix4, Rotation3, UnitQuaternion, Vector2, Vector3, Vector4};
 
 /// What joins a node to the next.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -61,6 +61,9 @@ pub struct BeltProgram {
     pub loads: Vec<NodeLoad>,
     /// Weight per unit length, world axes.
     pub weight: Vector3<f64>,
+    /// Signed half turns after which the end of a closed belt joins its start. The seam is then the last of the supports,
+    /// which holds the end's frame, and the last of the links.
+    pub half_turns: Option<i32>,
     /// Bend and rib slope of every node where they are prescribed.
     fixed: Vec<[Option<f64>; 2]>,
 }
@@ -155,6 +158,7 @@ impl BeltProgram {
             links: Vec::new(),
             loads: Vec::new(),
             weight: Vector3::zeros(),
+            half_turns: None,
             fixed: vec![[None; 2]; nodes],
         }
         .with_supports(Vec::new())
@@ -170,6 +174,19 @@ impl BeltProgram {
         self.supports = supports;
         self.fix_across_joints();
         self
+    }
+
+    /// A closed belt cut open at its seam and twisted there by an angle in place of its half turns, as between two
+    /// clamps.
+    pub fn cut_and_twisted(&self, angle: f64) -> Self {
+        let mut cut = self.clone();
+        let start = cut.supports[0].hold.frame().unwrap_or_default();
+        if let (Some(end), Some(seam)) = (cut.supports.last_mut(), cut.links.last_mut()) {
+            let twist = UnitQuaternion::from_scaled_axis(angle * Vector3::y());
+            end.hold = Hold::Frame(start * twist);
+            seam.fields = [None; 2];
+        }
+        cut
     }
 
     /// What a stiffened stretch prescribes at a node: no bend inside, square ribs at its ends too.
@@ -306,6 +323,11 @@ impl BeltProgram {
             true => dead,
             false => dead + self.pieces.iter().enumerate().map(weight).sum::<f64>(),
         }
+    }
+
+    /// Whether weight or dead forces act.
+    pub fn is_loaded(&self) -> bool {
+        !self.is_weightless() || !self.loads.is_empty()
     }
 
     fn is_weightless(&self) -> bool {
@@ -699,7 +721,6 @@ fn carry_controls(
 mod tests {
     use super::*;
     use crate::energy::Curl;
-    use nalgebra::UnitQuaternion;
 
     fn element(length: f64, geodesic: f64) -> Piece {
         Piece::Strip(Element {

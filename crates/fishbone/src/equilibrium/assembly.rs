@@ -53,6 +53,7 @@ impl<'a> Assembly<'a> {
         program.links = links;
         program.loads = self.node_loads(&places);
         program.weight = self.weight();
+        program.half_turns = self.belt.half_turns;
         program
     }
 

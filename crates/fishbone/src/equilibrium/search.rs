@@ -1,11 +1,12 @@
 //! The search for a minimum: where it starts, and where it starts again.
 
 use crate::energy::EnergyModel;
-use crate::guess::{disturb, guess, inside};
+use crate::guess::{buckle, disturb, guess, inside, ring};
 use crate::program::{BeltPoint, BeltProgram, Piece};
 use crate::scenario::SAME_PLACE;
 use crate::solver::{self, Curvature, Outcome, Settings, Solution};
 use nalgebra::{Vector2, Vector3};
+use std::f64::consts::PI;
 use std::ops::ControlFlow;
 
 /// First barrier from a guess: so high that the search first finds the supports, then lowers the energy.
@@ -15,6 +16,9 @@ const WARM: f64 = 0.1;
 const ITERATIONS: usize = 500;
 /// By how much the start is disturbed where the plain one leads to no minimum.
 const DISTURBANCES: [f64; 3] = [0.05, 0.2, 0.4];
+
+/// Slope of the ribs of a flat belt when it is tried whether it buckles.
+const SLANT: f64 = 0.7;
 
 type Proceed<'a> = dyn FnMut() -> ControlFlow<()> + 'a;
 
@@ -66,12 +70,23 @@ impl Search {
 
     /// Searches from the guess, then from other starts, until a minimum is found; the best that was found otherwise.
     fn cold(&self, program: &BeltProgram, proceed: &mut Proceed) -> Solution<BeltPoint> {
-        let start = guess(program, &self.bulge);
+        let start = match program.half_turns {
+            None => guess(program, &self.bulge),
+            Some(half_turns) => self.twisted_up(program, half_turns, proceed),
+        };
         let mut best = self.minimise(program, start.clone(), COLD, proceed);
         if !is_done(&best) && program.model != EnergyModel::Wunderlich {
             best = better(best, |_| {
                 self.by_way_of_wunderlich(program, &start, proceed)
             });
+        }
+        for slope in [SLANT, -SLANT] {
+            if is_flat_under_load(program, &best) {
+                best = better(best, |best| {
+                    let buckled = buckle(program, &best.point, slope);
+                    self.minimise(program, buckled, WARM, proceed)
+                });
+            }
         }
         for share in DISTURBANCES {
             if is_done(&best) {
@@ -87,6 +102,26 @@ impl Search {
             });
         }
         best
+    }
+
+    /// The start for a closed belt: a ring cut open and twisted at the cut, as by hand, a little at a time.
+    fn twisted_up(
+        &self,
+        program: &BeltProgram,
+        half_turns: i32,
+        proceed: &mut Proceed,
+    ) -> BeltPoint {
+        /// Steps of an eighth of a turn keep to the shape that began as a ring.
+        const STEPS: i32 = 4;
+        let mut point = ring(program, &self.bulge);
+        for step in 1..=STEPS * half_turns.abs() {
+            let angle = PI * f64::from(half_turns.signum() * step) / f64::from(STEPS);
+            let cut = program.cut_and_twisted(angle);
+            point = self
+                .minimise(&cut, inside(&cut, point), WARM, proceed)
+                .point;
+        }
+        inside(program, point)
     }
 
     /// Solves with the energy that keeps the ribs apart of itself, and from there with the one asked for.
@@ -128,14 +163,24 @@ fn is_done(solution: &Solution<BeltPoint>) -> bool {
     solution.outcome == Outcome::Interrupted || rank(solution) == 2
 }
 
-/// The better of two ends, the later one of equals, with the iterations of both.
+/// Whether a belt under load has stayed flat: there the slope of its ribs costs nothing, and what it buckles into cannot
+/// be seen in the second variation.
+fn is_flat_under_load(program: &BeltProgram, solution: &Solution<BeltPoint>) -> bool {
+    const FLAT: f64 = 1e-6;
+    let mut fields = solution.point.fields.iter();
+    program.is_loaded() && fields.all(|fields| fields[0].abs() <= FLAT)
+}
+
+/// The better of two ends, of equals the lower, with the iterations of both.
 fn better(
     best: Solution<BeltPoint>,
     next: impl FnOnce(&Solution<BeltPoint>) -> Solution<BeltPoint>,
 ) -> Solution<BeltPoint> {
     let next = next(&best);
     let (best_iterations, next_iterations) = (best.iterations, next.iterations);
-    if next.outcome == Outcome::Interrupted || rank(&next) >= rank(&best) {
+    let lower = next.values.objective <= best.values.objective;
+    let better = rank(&next) > rank(&best) || (rank(&next) == rank(&best) && lower);
+    if next.outcome == Outcome::Interrupted || better {
         next.after(best_iterations)
     } else {
         best.after(next_iterations)

@@ -44,6 +44,26 @@ impl Border {
         if self.pairs.is_empty() {
             return Ok(());
         }
+        let eigen = SymmetricEigen::new(self.give(chain, factor, links, compliance));
+        // With the rows held, the whole is as concave as the chain less the negative directions of what gives way.
+        let negative = |value: &&f64| **value < 0.0;
+        if eigen.eigenvalues.iter().filter(negative).count() != concave {
+            return Err(TooConcave);
+        }
+        self.inverse = &eigen.eigenvectors
+            * DMatrix::from_diagonal(&eigen.eigenvalues.map(|value| 1.0 / value))
+            * eigen.eigenvectors.transpose();
+        Ok(())
+    }
+
+    /// How far every row gives way to a unit multiplier of every other, by a compliance of its own and by the chain's.
+    pub(super) fn give(
+        &mut self,
+        chain: &Chain,
+        factor: &mut Factor,
+        links: &[[RowsByNode; 2]],
+        compliance: f64,
+    ) -> DMatrix<f64> {
         for row in 0..self.rows() {
             self.gradient.fill(NodeVector::zeros());
             let rows = &links[row / ROWS];
@@ -52,28 +72,15 @@ impl Border {
             }
             chain.solve(factor, &self.gradient, &mut self.answers[row]);
         }
-        let mut yielding = DMatrix::identity(self.rows(), self.rows()) * compliance;
+        let mut give = DMatrix::identity(self.rows(), self.rows()) * compliance;
         for (column, answer) in self.answers.iter().enumerate() {
             for (i, change) in self.changes(links, answer).into_iter().enumerate() {
                 for (j, value) in change.iter().enumerate() {
-                    yielding[(ROWS * i + j, column)] -= value;
+                    give[(ROWS * i + j, column)] -= value;
                 }
             }
         }
-        let eigen = SymmetricEigen::new(0.5 * (&yielding + yielding.transpose()));
-        // With the rows held, the whole is as concave as the chain less the negative directions of what gives way.
-        let held = eigen
-            .eigenvalues
-            .iter()
-            .filter(|value| **value < 0.0)
-            .count();
-        if held != concave {
-            return Err(TooConcave);
-        }
-        self.inverse = &eigen.eigenvectors
-            * DMatrix::from_diagonal(&eigen.eigenvalues.map(|value| 1.0 / value))
-            * eigen.eigenvectors.transpose();
-        Ok(())
+        0.5 * (&give + give.transpose())
     }
 
     /// Adds to a step of the chain what the links take to change by `−missing` less what it brings already; the

@@ -1,6 +1,6 @@
 //! The main loop: barrier, step, line search, restoration.
 
-use super::chain::{NodeVector, Stage};
+use super::chain::NodeVector;
 use super::filter::{Filter, Measure};
 use super::newton::Newton;
 use super::{
@@ -406,20 +406,7 @@ impl<'a, P: Program> State<'a, P> {
         const SHORTEST: f64 = 1e-8;
         const SUFFICIENT: f64 = 1e-4;
         self.linearise();
-        for stage in &mut self.linear.chain.stages {
-            *stage = Stage {
-                state_by_state: stage.state_by_state,
-                state_by_first: stage.state_by_first,
-                state_by_second: stage.state_by_second,
-                tie: stage.tie,
-                free: stage.free,
-                ..Stage::zero()
-            };
-        }
-        for term in &mut self.linear.chain.nodes {
-            term.hessian.fill(0.0);
-        }
-        self.linear.chain.last_state.fill(0.0);
+        self.linear.forget_second_derivatives();
         self.linear.gradient.fill(NodeVector::zeros());
         self.newton
             .assemble(&self.linear, &self.values, &self.bound_multipliers);

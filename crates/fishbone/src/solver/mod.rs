@@ -10,8 +10,10 @@ pub mod chain;
 mod filter;
 mod interior_point;
 mod newton;
+mod rank;
 
 pub use interior_point::minimise;
+pub use rank::dependent_constraints;
 
 use chain::{Chain, NodeMatrix, NodeTerm, NodeVector, Stage};
 use nalgebra::{Matrix6, SMatrix, SVector, Vector4};
