@@ -1,17 +1,26 @@
 //! The deformed surface: fundamental forms, curvatures, ribs, edges and meshes, Eq. (5)–(31).
 //!
-//! The rib through P(u) is the straight line `x(u) + v (ζ − β η)`; in the flat board, with y along and z across the
-//! spine, it is the line of points `(u − v β, v)`. Both are known once a [`Rib`] is, whatever the outline of the
-//! board.
+//! The rib through P(u) is the straight line `x(u) + v (ζ − β η)`; in the flat board it is the line `p(u) + v (n − β t)`,
+//! where p is the flat spine with its tangent t and its normal n. Both are known once a [`Rib`] is. The flat spine is
+//! made of lines, arcs and corners, and so is the [`Outline`] of the board.
 
+mod board;
 mod curvature;
+mod curve;
 mod extremes;
+mod flat;
+mod locate;
 mod mesh;
+mod outline;
+mod patch;
 mod rib;
 
 pub use curvature::*;
+pub use curve::*;
 pub use extremes::*;
+pub use flat::*;
 pub use mesh::*;
+pub use outline::*;
 pub use rib::*;
 
 #[cfg(test)]

@@ -1,8 +1,9 @@
 //! Highest point, tightest bend, narrowest margin.
 
+use super::board::Board;
 use super::curvature::{bend_radius, curvature};
-use super::rib::{Board, rib_convergence, rib_convergence_bound, rib_foot};
-use crate::spine::{Spine, SpinePoint};
+use super::rib::{rib_convergence, rib_convergence_bound};
+use crate::spine::{Piece, Spine, SpinePoint};
 use nalgebra::Vector3;
 
 /// The farthest point of the spine along a direction.
@@ -39,7 +40,9 @@ pub fn highest_point(spine: &Spine, direction: &Vector3<f64>) -> HighestPoint {
 
 /// Pieces of an element that turn by half a radian at most, so that none hides a peak and a valley.
 fn pieces(spine: &Spine, element: usize) -> usize {
-    let rate = |node: usize| spine.bend[node].abs() * 1f64.hypot(spine.rib_slope[node]);
+    let geodesic = spine.pieces[element].geodesic();
+    let bend = |node: usize| spine.bend[node] * 1f64.hypot(spine.rib_slope[node]);
+    let rate = |node: usize| bend(node).hypot(geodesic);
     let turn = spine.element_length(element) * rate(element).max(rate(element + 1));
     (2.0 * turn).ceil().clamp(1.0, 1000.0) as usize
 }
@@ -83,7 +86,7 @@ pub struct BendRadius {
     pub value: f64,
     /// Arc length of the foot of its rib.
     pub u: f64,
-    /// Where on the rib, v in [−V/2, V/2].
+    /// Where on the rib, v.
     pub v: f64,
 }
 
@@ -115,39 +118,30 @@ const SAMPLES: usize = 8;
 
 /// The least radius of bend over the whole width, (1 − v s)/|κ₁|; `None` where the belt is flat all over.
 ///
-/// In each element s is constant and the tightest point of a rib is the end towards which the ribs converge.
+/// The tightest point of a rib is the end towards which the ribs converge.
 pub fn least_bend_radius(spine: &Spine) -> Option<BendRadius> {
     let board = Board::of(spine);
-    let pieces = bent_elements(spine).flat_map(|element| smooth_pieces(spine, &board, element));
-    let bends = pieces.map(|piece| tightest_in(spine, &board, piece));
+    let parts = strips(spine).flat_map(|element| smooth_parts(spine, &board, element));
+    let bends = parts.map(|part| tightest_in(spine, &board, part));
     let least = bends.min_by(|a, b| a.value.total_cmp(&b.value));
     least.filter(|bend| bend.value.is_finite())
 }
 
 /// A part of an element, by distances from its first node.
 #[derive(Clone, Copy)]
-struct Piece {
+struct Part {
     element: usize,
     from: f64,
     to: f64,
 }
 
-/// The parts of an element between the ribs through the board's corners, where the ribs' ends change lines.
-fn smooth_pieces(spine: &Spine, board: &Board, element: usize) -> Vec<Piece> {
-    let length = spine.element_length(element);
-    let feet = board
-        .corners()
-        .map(|corner| rib_foot(spine, corner.x, corner.y));
-    let inside = |distance: &f64| 0.0 < *distance && *distance < length;
-    let mut cuts: Vec<f64> = feet
-        .iter()
-        .map(|foot| foot - spine.u[element])
-        .filter(inside)
-        .collect();
-    cuts.extend([0.0, length]);
-    cuts.sort_by(f64::total_cmp);
+/// The parts of an element between the ribs through the board's vertices, where the ribs' ends change lines.
+fn smooth_parts(spine: &Spine, board: &Board, element: usize) -> Vec<Part> {
+    let mut cuts = board.vertex_ribs(spine, element);
+    cuts.insert(0, 0.0);
+    cuts.push(spine.element_length(element));
     cuts.windows(2)
-        .map(|cut| Piece {
+        .map(|cut| Part {
             element,
             from: cut[0],
             to: cut[1],
@@ -155,47 +149,51 @@ fn smooth_pieces(spine: &Spine, board: &Board, element: usize) -> Vec<Piece> {
         .collect()
 }
 
-fn bent_elements(spine: &Spine) -> impl Iterator<Item = usize> {
-    (0..spine.elements()).filter(|&element| spine.element_length(element) > 0.0)
+/// The flexible elements: neither joints, which have no length, nor stiffeners, which have no ribs.
+fn strips(spine: &Spine) -> impl Iterator<Item = usize> {
+    (0..spine.elements()).filter(|&element| {
+        matches!(spine.pieces[element], Piece::Strip { .. }) && spine.element_length(element) > 0.0
+    })
 }
 
-fn convergence(spine: &Spine, element: usize) -> f64 {
+/// s inside an element, at a point of given rib slope.
+fn convergence(spine: &Spine, element: usize, rib_slope: f64) -> f64 {
     let rise = spine.rib_slope[element + 1] - spine.rib_slope[element];
-    rib_convergence(
-        rise / spine.element_length(element),
-        spine.pieces[element].geodesic(),
-        0.5 * (spine.rib_slope[element] + spine.rib_slope[element + 1]),
-    )
+    let rate = rise / spine.element_length(element);
+    rib_convergence(rate, spine.pieces[element].geodesic(), rib_slope)
 }
 
-fn tightest_in(spine: &Spine, board: &Board, piece: Piece) -> BendRadius {
-    let radius = |distance: f64| tightest_on_rib(spine, board, piece.element, distance);
-    let step = (piece.to - piece.from) / SAMPLES as f64;
-    let samples = (0..=SAMPLES).map(|i| radius(piece.from + i as f64 * step));
+/// s in the middle of an element.
+fn mean_convergence(spine: &Spine, element: usize) -> f64 {
+    let mean = 0.5 * (spine.rib_slope[element] + spine.rib_slope[element + 1]);
+    convergence(spine, element, mean)
+}
+
+fn tightest_in(spine: &Spine, board: &Board, part: Part) -> BendRadius {
+    let radius = |distance: f64| tightest_on_rib(spine, board, part.element, distance);
+    let step = (part.to - part.from) / SAMPLES as f64;
+    let samples = (0..=SAMPLES).map(|i| radius(part.from + i as f64 * step));
     let sharper = |a: BendRadius, b: BendRadius| if b.value < a.value { b } else { a };
-    let best = samples.fold(radius(piece.from), sharper);
-    let centre = best.u - spine.u[piece.element];
-    let (low, high) = (
-        (centre - step).max(piece.from),
-        (centre + step).min(piece.to),
-    );
+    let best = samples.fold(radius(part.from), sharper);
+    let centre = best.u - spine.u[part.element];
+    let (low, high) = ((centre - step).max(part.from), (centre + step).min(part.to));
     sharper(best, radius(golden_section(|x| radius(x).value, low, high)))
 }
 
 fn tightest_on_rib(spine: &Spine, board: &Board, element: usize, distance: f64) -> BendRadius {
     let (bend, slope) = spine.fields(element, distance);
-    let (u, s) = (spine.u[element] + distance, convergence(spine, element));
-    let [minus, plus] = board.rib_ends(u, slope).map(|end| end.y);
+    let s = convergence(spine, element, slope);
+    let [minus, plus] = board.ends(&board.foot_within(spine, element, distance));
     let v = if s > 0.0 {
-        plus
+        plus.v
     } else if s < 0.0 {
-        minus
+        minus.v
     } else {
         0.0
     };
     BendRadius {
         value: bend_radius(curvature(bend, slope), s, v),
-        u,
+        u: spine.u[element] + distance,
         v,
     }
 }
@@ -223,13 +221,13 @@ pub struct RibMargin {
     pub u: f64,
 }
 
-/// The least of 2/V − |s| over the belt, s being constant in each element.
+/// The least of 2/V − |s| over the flexible elements, s being that in the middle of each, as it is bounded in solving.
 ///
 /// Source: Eq. (33)
 pub fn rib_margin(spine: &Spine) -> RibMargin {
     let bound = rib_convergence_bound(spine.width);
     let margin = |element: usize| RibMargin {
-        value: bound - convergence(spine, element).abs(),
+        value: bound - mean_convergence(spine, element).abs(),
         u: 0.5 * (spine.u[element] + spine.u[element + 1]),
     };
     let start = RibMargin {
@@ -237,7 +235,7 @@ pub fn rib_margin(spine: &Spine) -> RibMargin {
         u: spine.u.first().copied().unwrap_or(0.0),
     };
     let narrower = |a: RibMargin, b: RibMargin| if b.value < a.value { b } else { a };
-    bent_elements(spine).map(margin).fold(start, narrower)
+    strips(spine).map(margin).fold(start, narrower)
 }
 
 #[cfg(test)]
@@ -348,10 +346,10 @@ mod tests {
                 for i in 0..=100 {
                     let (bend, slope) = spine.fields(element, h * f64::from(i) / 100.0);
                     let u = spine.u[element] + h * f64::from(i) / 100.0;
-                    let [a, b] = board.rib_ends(u, slope).map(|end| end.y);
+                    let [a, b] = board.ends(&board.foot_at(&spine, u)).map(|end| end.v);
                     for j in 0..=4 {
                         let v = a + (b - a) * f64::from(j) / 4.0;
-                        let s = convergence(&spine, element);
+                        let s = convergence(&spine, element, slope);
                         let radius = bend_radius(curvature(bend, slope), s, v);
                         prop_assert!(radius >= least * (1.0 - 1e-9));
                     }

@@ -1,6 +1,8 @@
 //! Triangle meshes of the whole belt.
 
-use super::rib::{Board, Rib, material_point, rib_foot};
+use super::board::{Board, End, Foot};
+use super::patch::{Polygon, edge_points};
+use super::rib::Rib;
 use crate::spine::Spine;
 use nalgebra::{Vector2, Vector3};
 
@@ -9,33 +11,65 @@ use nalgebra::{Vector2, Vector3};
 pub struct Mesh {
     /// Deformed points.
     pub vertices: Vec<Vector3<f64>>,
-    /// The same points of the flat board: (y, z) along and across the spine.
+    /// The same points of the flat board, (y, z). Of a closed belt the points of its seam follow once more, where the
+    /// flat board ends.
     pub flat: Vec<Vector2<f64>>,
     /// Vertex indices, counter-clockwise about +ξ.
     pub triangles: Vec<[u32; 3]>,
+    /// The same triangles in the flat board, as indices of `flat`; they differ along the seam of a closed belt alone.
+    pub flat_triangles: Vec<[u32; 3]>,
 }
 
 /// The mesh of the whole belt: strips between ribs of `n_across` points (at least 2), flat patches in the corners
-/// that no rib reaches.
+/// that no rib reaches and where stiffeners are joined at corners.
 ///
-/// It covers the flat board exactly, without gaps, overlaps or T-junctions: ribs are added through those corners of
-/// the board that lie between two nodes' ribs, and ribs that meet on an edge share their vertex. Where ribs cross
-/// inside the width, against Eq. (33), there is no surface, and the triangles overlap.
+/// It covers the flat board without gaps, overlaps or T-junctions, exactly but for the arcs of its outline, which
+/// become chords between neighbouring ribs: ribs are added through those vertices of the outline that lie between two
+/// nodes' ribs, and ribs that meet on an edge share their vertex. A closed belt has no ends, and its last rib is its
+/// first, reversed after an odd number of half turns. Where ribs cross inside the board, against Eq. (33), there is no
+/// surface, and the triangles overlap.
 ///
 /// # Panics
 ///
 /// If the spine has no nodes.
 pub fn mesh(spine: &Spine, n_across: usize) -> Mesh {
     let mut builder = Builder::new(spine);
-    let rows: Vec<Vec<u32>> = builder.rows(n_across.max(2));
+    let rows = builder.rows(n_across.max(2));
     for pair in rows.windows(2) {
-        builder.strip(&pair[0], &pair[1]);
+        match pair[1].closes_plate {
+            true => builder.plate(&pair[0], &pair[1]),
+            false => builder.strip(&pair[0].points, &pair[1].points),
+        }
     }
     if let [first, .., last] = rows.as_slice() {
-        builder.end_patch(first, 0.0);
-        builder.end_patch(last, builder.board.length);
+        builder.end_patch(first, true);
+        builder.end_patch(last, false);
+        if let Some(half_turns) = spine.half_turns {
+            return builder.closed(first, last, half_turns % 2 != 0);
+        }
     }
     builder.mesh
+}
+
+/// A rib as the mesh has it.
+struct Row {
+    foot: Foot,
+    ends: [End; 2],
+    /// Vertex indices from the −ζ end to the +ζ end.
+    points: Vec<u32>,
+    /// Whether a plate, and not a strip, joins it to the row before.
+    closes_plate: bool,
+}
+
+impl Row {
+    /// Vertex indices with their places on the rib, exactly in line.
+    fn boundary(&self) -> Vec<(u32, Vector2<f64>)> {
+        let [minus, plus] = &self.ends;
+        let last = (self.points.len() - 1) as f64;
+        let at = |i: usize| minus.flat.lerp(&plus.flat, i as f64 / last);
+        let points = self.points.iter().enumerate();
+        points.map(|(i, &vertex)| (vertex, at(i))).collect()
+    }
 }
 
 struct Builder<'a> {
@@ -53,74 +87,57 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Vertex indices of all ribs, in the order of u; a rib that coincides with the one before is left out.
-    fn rows(&mut self, n: usize) -> Vec<Vec<u32>> {
-        let mut rows: Vec<Vec<u32>> = Vec::new();
-        for u in self.feet() {
-            let rib = Rib::on(&self.board, &self.spine.at(u));
-            let ends = self.board.rib_ends(rib.u, rib.slope);
+    /// All ribs, in the order of u; one that coincides with the one before is left out.
+    fn rows(&mut self, n: usize) -> Vec<Row> {
+        let mut rows: Vec<Row> = Vec::new();
+        for (foot, closes_plate) in self.feet() {
+            let ends = self.board.ends(&foot);
             let shared = rows
                 .last()
                 .map_or([None; 2], |before| self.shared_ends(before, &ends));
             if shared.contains(&None) {
-                rows.push(self.row(&rib, &ends, &shared, n));
+                let points = self.row(&Rib::new(&foot, &ends), &ends, &shared, n);
+                rows.push(Row {
+                    foot,
+                    ends,
+                    points,
+                    closes_plate,
+                });
             }
         }
         rows
     }
 
-    /// Feet of the ribs to draw: the nodes, and the ribs through the corners.
-    fn feet(&self) -> Vec<f64> {
-        let mut feet = self.spine.u.clone();
-        let corners = self.board.corners();
-        let through_corners = corners.iter().filter(|corner| self.is_between_ribs(corner));
-        feet.extend(through_corners.map(|corner| rib_foot(self.spine, corner.x, corner.y)));
-        feet.sort_by(f64::total_cmp);
+    /// Feet of the ribs to draw, and whether each closes a plate: the nodes, and the ribs through vertices.
+    fn feet(&self) -> Vec<(Foot, bool)> {
+        let (board, spine) = (&self.board, self.spine);
+        let mut feet = Vec::new();
+        for node in 0..spine.u.len() {
+            let inside = |&[from, to]: &[usize; 2]| from < node && node < to;
+            if board.plates.iter().any(inside) {
+                continue;
+            }
+            let closes_plate = board.plates.iter().any(|&[_, to]| to == node);
+            feet.push((board.foot_at_node(spine, node), closes_plate));
+            if node < spine.elements() {
+                let between = board.vertex_ribs(spine, node).into_iter();
+                feet.extend(between.map(|at| (board.foot_within(spine, node, at), false)));
+            }
+        }
         feet
     }
 
-    /// Whether a rib other than the first and the last runs through a corner.
-    fn is_between_ribs(&self, corner: &Vector2<f64>) -> bool {
-        [0.0, self.board.length]
-            .iter()
-            .all(|&end| !self.is_end_of_rib(corner, end) && !self.is_beyond(corner, end))
-    }
-
-    fn is_end_of_rib(&self, corner: &Vector2<f64>, end: f64) -> bool {
-        let slope = self.spine.at(end).rib_slope;
-        self.board.rib_ends(end, slope).contains(corner)
-    }
-
-    /// Whether the rib at an end of the belt leaves the corner on the far side, where no rib comes.
-    fn is_beyond(&self, corner: &Vector2<f64>, end: f64) -> bool {
-        let excess = end - corner.y * self.spine.at(end).rib_slope - corner.x;
-        if end == 0.0 {
-            excess > 0.0
-        } else {
-            excess < 0.0
-        }
-    }
-
     /// The end vertices of the row before that the ends of the next rib fall on.
-    fn shared_ends(&self, before: &[u32], ends: &[Vector2<f64>; 2]) -> [Option<u32>; 2] {
-        let coincides = |vertex: u32, end: &Vector2<f64>| {
-            let gap = (self.mesh.flat[vertex as usize] - end).norm();
+    fn shared_ends(&self, before: &Row, ends: &[End; 2]) -> [Option<u32>; 2] {
+        let last = before.points.len() - 1;
+        [(0, before.points[0]), (1, before.points[last])].map(|(side, vertex)| {
+            let gap = (self.mesh.flat[vertex as usize] - ends[side].flat).norm();
             (gap <= self.board.tolerance()).then_some(vertex)
-        };
-        [
-            coincides(before[0], &ends[0]),
-            coincides(before[before.len() - 1], &ends[1]),
-        ]
+        })
     }
 
     /// The vertices of one rib, from the −ζ end to the +ζ end.
-    fn row(
-        &mut self,
-        rib: &Rib,
-        ends: &[Vector2<f64>; 2],
-        shared: &[Option<u32>; 2],
-        n: usize,
-    ) -> Vec<u32> {
+    fn row(&mut self, rib: &Rib, ends: &[End; 2], shared: &[Option<u32>; 2], n: usize) -> Vec<u32> {
         let mut row = Vec::with_capacity(n);
         for (i, v) in rib.stations(n).enumerate() {
             let shared = if i == 0 {
@@ -130,7 +147,7 @@ impl<'a> Builder<'a> {
             } else {
                 None
             };
-            let flat = ends[0].lerp(&ends[1], i as f64 / (n - 1) as f64);
+            let flat = ends[0].flat.lerp(&ends[1].flat, i as f64 / (n - 1) as f64);
             row.push(shared.unwrap_or_else(|| self.vertex(rib.point(v), flat)));
         }
         row
@@ -149,296 +166,118 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// The flat corner beyond the rib at an end of the belt, as a fan about the board's corner.
-    fn end_patch(&mut self, row: &[u32], end: f64) {
-        let own = |corner: &Vector2<f64>| corner.x == end;
-        let (near, far): (Vec<_>, Vec<_>) = self
-            .board
-            .corners()
-            .into_iter()
-            .filter(|c| self.is_left_over(c, end))
-            .partition(own);
-        for corner in near {
-            let pivot = self.corner_vertex(&corner);
-            let mut chain = self.outside_in(row, corner.y);
-            // So steep a rib leaves through the far end line, and cuts off a second corner.
-            for &other in far.iter().filter(|other| other.y == corner.y) {
-                chain.insert(0, self.corner_vertex(&other));
-            }
-            for pair in chain.windows(2) {
-                self.triangle_counter_clockwise([pivot, pair[0], pair[1]]);
-            }
+    /// The flat corner beyond the rib at an end of an open belt.
+    fn end_patch(&mut self, row: &Row, at_start: bool) {
+        let Some(side) = self.board.leftover(&row.ends, at_start) else {
+            return;
+        };
+        let last = (self.board.chains.edges[side].len() - 1) as f64;
+        let (corner, end) = (if at_start { 1.0 } else { last }, row.ends[side].place);
+        let [from, to] = [corner.min(end), corner.max(end)];
+        let mut edge = edge_points(&self.board, side, [from, to], self.step());
+        if !at_start {
+            edge.reverse();
         }
-    }
-
-    fn is_left_over(&self, corner: &Vector2<f64>, end: f64) -> bool {
-        self.is_beyond(corner, end) && !self.is_end_of_rib(corner, end)
-    }
-
-    fn corner_vertex(&mut self, corner: &Vector2<f64>) -> u32 {
-        let point = material_point(self.spine, corner.x, corner.y).unwrap_or_default();
-        self.vertex(point, *corner)
-    }
-
-    /// A row ordered from its end on the side of z to the other one.
-    fn outside_in(&self, row: &[u32], z: f64) -> Vec<u32> {
-        let mut row = row.to_vec();
-        if z > 0.0 {
-            row.reverse();
+        // From the rib's end to the spine's, by the corner and back along the edge.
+        let mut polygon = row.boundary();
+        if side == 1 {
+            polygon.reverse();
         }
-        row
+        let corner = self.board.chains.edges[side][corner as usize].curve.first();
+        let around = [corner].into_iter().chain(edge);
+        polygon.extend(around.map(|flat| (self.flat_vertex(&row.foot, flat), flat)));
+        self.patch(polygon);
     }
 
-    fn triangle_counter_clockwise(&mut self, [a, b, c]: [u32; 3]) {
-        let flat = |i: u32| self.mesh.flat[i as usize];
-        let turn = (flat(b) - flat(a)).perp(&(flat(c) - flat(a)));
-        self.triangle(if turn > 0.0 { [a, b, c] } else { [a, c, b] });
+    /// The bent stiffener between two ribs.
+    fn plate(&mut self, before: &Row, after: &Row) {
+        let [minus, mut plus] = [0, 1].map(|side| {
+            let places = [before.ends[side].place, after.ends[side].place];
+            edge_points(&self.board, side, places, self.step())
+        });
+        plus.reverse();
+        let mut polygon: Vec<(u32, Vector2<f64>)> = Vec::new();
+        let mut add = |flat| (self.flat_vertex(&before.foot, flat), flat);
+        polygon.extend(minus.into_iter().map(&mut add));
+        polygon.extend(after.boundary());
+        polygon.extend(plus.into_iter().map(&mut add));
+        polygon.extend(before.boundary().into_iter().rev());
+        polygon.dedup_by_key(|(vertex, _)| *vertex);
+        if polygon.len() > 1 && polygon[0].0 == polygon[polygon.len() - 1].0 {
+            polygon.pop();
+        }
+        self.patch(polygon);
+    }
+
+    /// Mean length of the elements: how finely arcs are divided where there are no ribs.
+    fn step(&self) -> f64 {
+        self.spine.length() / self.spine.elements().max(1) as f64
+    }
+
+    /// A vertex in the tangent plane at a foot.
+    fn flat_vertex(&mut self, foot: &Foot, flat: Vector2<f64>) -> u32 {
+        let local = foot.flat.local(&flat);
+        let point = Vector3::new(0.0, local.x, local.y);
+        self.vertex(foot.point.pose.transform(&point), flat)
+    }
+
+    /// Triangles of a polygon in one plane, of vertices and where they ought to be but for the tolerance.
+    fn patch(&mut self, boundary: Vec<(u32, Vector2<f64>)>) {
+        let (mut vertices, corners): (Vec<u32>, Vec<_>) = boundary.into_iter().unzip();
+        let mut polygon = Polygon(corners);
+        if polygon.doubled_area() < 0.0 {
+            vertices.reverse();
+            polygon.0.reverse();
+        }
+        for triangle in polygon.triangles() {
+            self.triangle(triangle.map(|i| vertices[i]));
+        }
     }
 
     /// Adds a triangle unless shared vertices have made it a line.
     fn triangle(&mut self, [a, b, c]: [u32; 3]) {
         if a != b && b != c && c != a {
             self.mesh.triangles.push([a, b, c]);
+            self.mesh.flat_triangles.push([a, b, c]);
+        }
+    }
+
+    /// The mesh with its last row made one with its first.
+    fn closed(self, first: &Row, last: &Row, is_reversed: bool) -> Mesh {
+        let mut onto = first.points.clone();
+        if is_reversed {
+            onto.reverse();
+        }
+        let mut target: Vec<Option<u32>> = vec![None; self.mesh.flat.len()];
+        for (&from, to) in last.points.iter().zip(onto) {
+            target[from as usize] = Some(to);
+        }
+        self.mesh.merged(&target)
+    }
+}
+
+impl Mesh {
+    /// The mesh with some vertices merged into others; their flat points go to the end.
+    fn merged(self, target: &[Option<u32>]) -> Self {
+        let (kept, gone): (Vec<usize>, Vec<usize>) =
+            (0..self.flat.len()).partition(|&index| target[index].is_none());
+        let order = || kept.iter().chain(&gone).copied();
+        let mut index = vec![0; self.flat.len()];
+        for (new, old) in order().enumerate() {
+            index[old] = new as u32;
+        }
+        let merged = |old: u32| index[target[old as usize].unwrap_or(old) as usize];
+        let triangles = self.triangles.iter();
+        Self {
+            vertices: kept.iter().map(|&old| self.vertices[old]).collect(),
+            flat: order().map(|old| self.flat[old]).collect(),
+            triangles: triangles.clone().map(|t| t.map(merged)).collect(),
+            flat_triangles: triangles
+                .map(|t| t.map(|old| index[old as usize]))
+                .collect(),
         }
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::spine::Piece;
-    use crate::surface::samples::{spine, waves};
-    use approx::assert_relative_eq;
-    use proptest::prelude::*;
-    use std::collections::{HashMap, HashSet};
-    use std::f64::consts::TAU;
-
-    fn flat_area(mesh: &Mesh, [a, b, c]: [u32; 3]) -> f64 {
-        let flat = |i: u32| mesh.flat[i as usize];
-        0.5 * (flat(b) - flat(a)).perp(&(flat(c) - flat(a)))
-    }
-
-    fn area(mesh: &Mesh, [a, b, c]: [u32; 3]) -> f64 {
-        let x = |i: u32| mesh.vertices[i as usize];
-        0.5 * (x(b) - x(a)).cross(&(x(c) - x(a))).norm()
-    }
-
-    fn directed_edges(mesh: &Mesh) -> Vec<(u32, u32)> {
-        mesh.triangles
-            .iter()
-            .flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)])
-            .collect()
-    }
-
-    fn boundary(mesh: &Mesh) -> Vec<(u32, u32)> {
-        let all = directed_edges(mesh);
-        let set: HashSet<_> = all.iter().copied().collect();
-        all.into_iter()
-            .filter(|&(a, b)| !set.contains(&(b, a)))
-            .collect()
-    }
-
-    /// A disc, oriented, every vertex in use, its flat boundary on the rectangle, its flat area the rectangle's.
-    fn assert_tiles_the_board(mesh: &Mesh, length: f64, width: f64) {
-        let edges = directed_edges(mesh);
-        let distinct: HashSet<_> = edges.iter().copied().collect();
-        assert_eq!(
-            distinct.len(),
-            edges.len(),
-            "an edge is used twice in one direction"
-        );
-        let boundary = boundary(mesh);
-        let used: HashSet<u32> = mesh.triangles.iter().flatten().copied().collect();
-        assert_eq!(used.len(), mesh.vertices.len(), "an unused vertex");
-        let undirected = (edges.len() + boundary.len()) / 2;
-        let euler = used.len() as i64 - undirected as i64 + mesh.triangles.len() as i64;
-        assert_eq!(euler, 1);
-        for &(a, b) in &boundary {
-            let (a, b) = (mesh.flat[a as usize], mesh.flat[b as usize]);
-            let on = |p: f64, q: f64, line: f64| p == line && q == line;
-            let lines = on(a.x, b.x, 0.0) || on(a.x, b.x, length);
-            assert!(
-                lines || on(a.y, b.y, -0.5 * width) || on(a.y, b.y, 0.5 * width),
-                "{a} {b}"
-            );
-        }
-        assert!(
-            mesh.triangles.iter().all(|&t| flat_area(mesh, t) > 0.0),
-            "a degenerate triangle"
-        );
-        let total: f64 = mesh.triangles.iter().map(|&t| flat_area(mesh, t)).sum();
-        assert_relative_eq!(total, length * width, max_relative = 1e-12);
-    }
-
-    /// Sum over interior vertices of |2π − Σ angles|.
-    fn total_angle_defect(mesh: &Mesh) -> f64 {
-        let rim: HashSet<u32> = boundary(mesh).into_iter().map(|(a, _)| a).collect();
-        let mut angles: HashMap<u32, f64> = HashMap::new();
-        for &[a, b, c] in &mesh.triangles {
-            for [p, q, r] in [[a, b, c], [b, c, a], [c, a, b]] {
-                let x = |i: u32| mesh.vertices[i as usize];
-                *angles.entry(p).or_default() += (x(q) - x(p)).angle(&(x(r) - x(p)));
-            }
-        }
-        let interior = angles.iter().filter(|(vertex, _)| !rim.contains(vertex));
-        interior.map(|(_, sum)| (TAU - sum).abs()).sum()
-    }
-
-    #[test]
-    fn test_square_ends_need_no_extra_ribs_or_patches() {
-        let spine = spine(1.0, 0.1, 20, |u| 3.0 * u, |u| u * (1.0 - u));
-        let mesh = mesh(&spine, 5);
-        assert_tiles_the_board(&mesh, 1.0, 0.1);
-        assert_eq!(
-            (mesh.vertices.len(), mesh.triangles.len()),
-            (21 * 5, 20 * 4 * 2)
-        );
-    }
-
-    #[test]
-    fn test_ribs_left_square_by_a_solver_count_as_square() {
-        let spine = spine(1.0, 0.1, 20, |u| 3.0 * u, |u| u * (1.0 - u) + 3e-9);
-        let mesh = mesh(&spine, 5);
-        assert_tiles_the_board(&mesh, 1.0, 0.1);
-        assert_eq!(mesh.vertices.len(), 21 * 5);
-    }
-
-    #[test]
-    fn test_unsquare_ends_get_corner_ribs_and_patches() {
-        let spine = spine(1.0, 0.1, 20, |u| 3.0 * u, |_| 0.7);
-        let mesh = mesh(&spine, 4);
-        assert_tiles_the_board(&mesh, 1.0, 0.1);
-        assert_eq!(mesh.vertices.len(), (21 + 2) * 4 + 2);
-    }
-
-    #[test]
-    fn test_corner_ribs_on_nodes_are_not_doubled() {
-        let spine = spine(1.0, 0.1, 20, |u| 3.0 * u, |_| 1.0);
-        let mesh = mesh(&spine, 4);
-        assert_tiles_the_board(&mesh, 1.0, 0.1);
-        assert_eq!(mesh.vertices.len(), 21 * 4 + 2);
-    }
-
-    #[test]
-    fn test_ribs_that_meet_on_an_edge_share_its_vertex() {
-        for (sign, error) in [(1.0, 0.0), (-1.0, 1e-9), (1.0, -1e-9)] {
-            let slope = move |u: f64| sign * (20.0 + error) * (0.1 - (u - 0.5).abs()).max(0.0);
-            let spine = spine(1.0, 0.1, 80, |u| 1.0 + u, slope);
-            let mesh = mesh(&spine, 5);
-            assert_tiles_the_board(&mesh, 1.0, 0.1);
-            assert!(mesh.vertices.len() < 81 * 5 - 10);
-        }
-    }
-
-    #[test]
-    fn test_ribs_steeper_than_the_board_is_long_leave_two_corners_flat() {
-        for slope in [8.0, -8.0, 2.0, 1.999_999_99, 2.000_000_01] {
-            let spine = spine(1.0, 1.0, 20, |u| 3.0 * u, |_| slope);
-            assert_tiles_the_board(&mesh(&spine, 4), 1.0, 1.0);
-        }
-    }
-
-    #[test]
-    fn test_repeated_nodes_add_no_ribs() {
-        let mut once = spine(1.0, 0.1, 10, |u| 3.0 * u, |u| u - 0.4);
-        let mesh_once = mesh(&once, 3);
-        once.u.insert(4, once.u[4]);
-        once.pieces.insert(4, Piece::Joint { angle: 0.0 });
-        once.pose.insert(4, once.pose[4]);
-        once.bend.insert(4, 7.0);
-        once.rib_slope.insert(4, once.rib_slope[4]);
-        assert_eq!(mesh(&once, 3).vertices.len(), mesh_once.vertices.len());
-    }
-
-    #[test]
-    fn test_flat_belt_is_its_own_board() {
-        let spine = spine(1.0, 0.1, 10, |_| 0.0, |u| 0.5 - 2.0 * u);
-        let mesh = mesh(&spine, 3);
-        for (x, flat) in mesh.vertices.iter().zip(&mesh.flat) {
-            let expected = spine.pose[0].transform(&Vector3::new(0.0, flat.x, flat.y));
-            assert_relative_eq!(*x, expected, epsilon = 1e-14);
-        }
-        let [a, b, c] = mesh.triangles[0].map(|i| mesh.vertices[i as usize]);
-        assert!((b - a).cross(&(c - a)).dot(&spine.pose[0].frame.column(0)) > 0.0);
-    }
-
-    #[test]
-    fn test_gaussian_curvature_is_zero_and_would_not_be_for_other_ribs() {
-        let mut spine = spine(
-            1.0,
-            0.2,
-            80,
-            |u| 4.0 - 6.0 * u,
-            |u| 0.8 * (3.0 * u).sin() + 0.3,
-        );
-        assert!(total_angle_defect(&mesh(&spine, 9)) < 1e-10);
-        spine.rib_slope.iter_mut().for_each(|slope| *slope *= 0.9);
-        assert!(total_angle_defect(&mesh(&spine, 9)) > 1e-4);
-    }
-
-    #[test]
-    fn test_lengths_and_areas_converge_to_those_of_the_flat_board() {
-        let errors = |n| {
-            let spine = spine(
-                1.0,
-                0.2,
-                n,
-                |u| 4.0 - 6.0 * u,
-                |u| 0.8 * (3.0 * u).sin() + 0.3,
-            );
-            let mesh = mesh(&spine, n / 5);
-            let total: f64 = mesh.triangles.iter().map(|&t| area(&mesh, t)).sum();
-            let stretch = |&(a, b): &(u32, u32)| {
-                let (a, b) = (a as usize, b as usize);
-                let flat = (mesh.flat[a] - mesh.flat[b]).norm();
-                ((mesh.vertices[a] - mesh.vertices[b]).norm() / flat - 1.0).abs()
-            };
-            let worst = directed_edges(&mesh)
-                .iter()
-                .map(stretch)
-                .fold(0.0, f64::max);
-            ((total / 0.2 - 1.0).abs(), worst)
-        };
-        let (coarse, fine) = (errors(40), errors(160));
-        assert!(
-            fine.0 < 0.1 * coarse.0 && fine.0 < 1e-4,
-            "{coarse:?} {fine:?}"
-        );
-        assert!(
-            fine.1 < 0.1 * coarse.1 && fine.1 < 1e-3,
-            "{coarse:?} {fine:?}"
-        );
-    }
-
-    proptest! {
-        #[test]
-        fn test_mesh_tiles_the_board((bend, slope) in waves(19.0), n in 10usize..60, n_across in 0usize..7) {
-            let spine = spine(1.0, 0.1, n, |u| bend.at(u), |u| slope.at(u));
-            assert_tiles_the_board(&mesh(&spine, n_across), 1.0, 0.1);
-        }
-
-        #[test]
-        fn test_mesh_tiles_the_board_where_ribs_sit_on_their_bound(
-            start in prop_oneof![-25.0..25.0f64, -1e-4..1e-4f64, Just(0.0), Just(20.0), Just(-20.0), 19.9999..20.0001f64],
-            steps in prop::collection::vec((-1i8..=1, -1e-8..1e-8f64), 1..60),
-        ) {
-            let h = 1.0 / steps.len() as f64;
-            let mut slopes = vec![start];
-            for (direction, noise) in &steps {
-                slopes.push(slopes[slopes.len() - 1] + 20.0 * h * (f64::from(*direction) + noise));
-            }
-            let spine = spine(1.0, 0.1, steps.len(), |u| u, |u| slopes[(u / h).round() as usize]);
-            assert_tiles_the_board(&mesh(&spine, 4), 1.0, 0.1);
-        }
-
-        #[test]
-        fn test_mesh_vertices_are_material_points((bend, slope) in waves(15.0)) {
-            let spine = spine(1.0, 0.1, 30, |u| bend.at(u), |u| slope.at(u));
-            let mesh = mesh(&spine, 4);
-            for (x, flat) in mesh.vertices.iter().zip(&mesh.flat) {
-                let expected = material_point(&spine, flat.x, flat.y).unwrap_or_default();
-                prop_assert!((x - expected).norm() < 1e-6);
-            }
-        }
-    }
-}
+mod tests;

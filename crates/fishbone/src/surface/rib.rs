@@ -1,7 +1,10 @@
 //! Ribs: the straight lines of the surface, Eq. (20)–(22) and (26)–(33).
 
+use super::board::{Board, End, Foot};
+use super::flat::FlatFrame;
+use super::locate::locate;
 use crate::lie::Pose;
-use crate::spine::{Spine, SpinePoint};
+use crate::spine::Spine;
 use nalgebra::{Vector2, Vector3};
 
 /// Rib angle α = atan β.
@@ -78,6 +81,8 @@ pub struct Rib {
     pub u: f64,
     /// Pose of the foot.
     pub pose: Pose,
+    /// Place of the foot in the flat board.
+    pub flat: FlatFrame,
     /// Rib slope β.
     pub slope: f64,
     /// Where it leaves the board on the −ζ side, v ≤ 0.
@@ -87,23 +92,25 @@ pub struct Rib {
 }
 
 impl Rib {
-    /// The rib through P(u) of a rectangular belt, ending where it leaves the board.
+    /// The rib through P(u), ending where it leaves the board.
     ///
     /// # Panics
     ///
     /// If the spine has no nodes.
     pub fn at(spine: &Spine, u: f64) -> Self {
-        Self::on(&Board::of(spine), &spine.at(u))
+        let board = Board::of(spine);
+        let foot = board.foot_at(spine, u);
+        Self::new(&foot, &board.ends(&foot))
     }
 
-    pub(super) fn on(board: &Board, foot: &SpinePoint) -> Self {
-        let [minus, plus] = board.rib_ends(foot.u, foot.rib_slope);
+    pub(super) fn new(foot: &Foot, [minus, plus]: &[End; 2]) -> Self {
         Self {
-            u: foot.u,
-            pose: foot.pose,
-            slope: foot.rib_slope,
-            v_minus: minus.y,
-            v_plus: plus.y,
+            u: foot.point.u,
+            pose: foot.point.pose,
+            flat: foot.flat,
+            slope: foot.point.rib_slope,
+            v_minus: minus.v,
+            v_plus: plus.v,
         }
     }
 
@@ -114,9 +121,9 @@ impl Rib {
         self.pose.transform(&Vector3::new(0.0, -v * self.slope, v))
     }
 
-    /// The same point of the flat board: (y, z) along and across the spine.
+    /// The same point of the flat board, (y, z).
     pub fn flat_point(&self, v: f64) -> Vector2<f64> {
-        Vector2::new(edge_foot(self.u, self.slope, v), v)
+        self.flat.global(&Vector2::new(-v * self.slope, v))
     }
 
     /// `n` values of v, evenly from the −ζ end to the +ζ end.
@@ -129,72 +136,21 @@ impl Rib {
     }
 }
 
-/// The flat rectangle 0 ≤ y ≤ U, |z| ≤ V/2.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Board {
-    pub(super) length: f64,
-    pub(super) half_width: f64,
-}
-
-impl Board {
-    pub(super) fn of(spine: &Spine) -> Self {
-        Self {
-            length: spine.length(),
-            half_width: 0.5 * spine.width,
-        }
-    }
-
-    pub(super) fn corners(&self) -> [Vector2<f64>; 4] {
-        let (length, z) = (self.length, self.half_width);
-        [(0.0, -z), (0.0, z), (length, -z), (length, z)].map(|(y, z)| Vector2::new(y, z))
-    }
-
-    /// Flat lengths below this are one point: far above a solver's residuals, far below what is drawn or made.
-    pub(super) fn tolerance(&self) -> f64 {
-        2e-6 * self.half_width
-    }
-
-    /// The flat ends of the rib through P(u), on the −ζ and on the +ζ side.
-    ///
-    /// Ends within the tolerance of a corner are put on it: a rib that a solver left square to ten digits ends
-    /// at the corners and not on its own end line.
-    pub(super) fn rib_ends(&self, u: f64, slope: f64) -> [Vector2<f64>; 2] {
-        [-self.half_width, self.half_width].map(|z| self.rib_end(u, slope, z))
-    }
-
-    fn rib_end(&self, u: f64, slope: f64, z: f64) -> Vector2<f64> {
-        let y = edge_foot(u, slope, z);
-        let inside = y.clamp(0.0, self.length);
-        if (y - inside).abs() <= self.tolerance() {
-            return Vector2::new(self.snapped_to_end(inside), z);
-        }
-        let v = (u - inside) / slope;
-        let at_corner = (z - v).abs() <= self.tolerance();
-        Vector2::new(inside, if at_corner { z } else { v })
-    }
-
-    fn snapped_to_end(&self, y: f64) -> f64 {
-        let near = |end: f64| (y - end).abs() <= self.tolerance();
-        [0.0, self.length]
-            .into_iter()
-            .find(|&end| near(end))
-            .unwrap_or(y)
-    }
-
-    fn contains(&self, y: f64, z: f64) -> bool {
-        let margin = self.tolerance();
-        (-margin..=self.length + margin).contains(&y) && z.abs() <= self.half_width + margin
-    }
-}
-
 /// The ribs at all nodes, clipped to the board.
 ///
-/// At an end without a square rib they leave through the end line; the corner that no rib reaches is flat.
+/// At an end without a square rib they leave through the end line; the corner that no rib reaches is flat. Between
+/// two stiffeners joined at a corner the whole board is flat, and the nodes' ribs there are lines of its plane.
+///
+/// # Panics
+///
+/// If the spine has no nodes.
 pub fn ribs(spine: &Spine) -> Vec<Rib> {
     let board = Board::of(spine);
-    (0..spine.u.len())
-        .map(|node| Rib::on(&board, &spine.node(node)))
-        .collect()
+    let rib = |node: usize| {
+        let foot = board.foot_at_node(spine, node);
+        Rib::new(&foot, &board.ends(&foot))
+    };
+    (0..spine.u.len()).map(rib).collect()
 }
 
 /// The ends of the ribs at all nodes.
@@ -229,46 +185,28 @@ pub fn points(spine: &Spine, n_across: usize) -> Vec<Vec<Vector3<f64>>> {
 
 /// The deformed point of the flat point (y, z), or `None` off the board.
 ///
-/// In a corner that no rib reaches the surface is the tangent plane of the nearest end.
+/// In a corner that no rib reaches the surface is the tangent plane of the nearest end. Where a flat board overlaps
+/// itself the layer of the least arc length counts. The board of a closed belt goes on beyond its start and its end,
+/// by a round to either side.
 ///
 /// # Panics
 ///
 /// If the spine has no nodes.
 pub fn material_point(spine: &Spine, y: f64, z: f64) -> Option<Vector3<f64>> {
-    let board = Board::of(spine);
-    board.contains(y, z).then(|| {
-        let u = rib_foot(spine, y, z);
-        // On a rib y − u = −z β: one formula for ribs and tangent planes.
-        spine.at(u).pose.transform(&Vector3::new(0.0, y - u, z))
-    })
+    let place = locate(spine, &Vector2::new(y, z))?;
+    let local = place.foot.flat.local(&place.point);
+    let pose = place.foot.point.pose;
+    Some(pose.transform(&Vector3::new(0.0, local.x, local.y)))
 }
 
-/// Arc length of the foot of the rib through the flat point (y, z), held to [0, U] where no rib reaches the point.
-///
-/// It is found by bisection, because u − z β(u) rises with u as long as ribs do not cross.
+/// Arc length of the foot of the rib through the flat point (y, z), that of the nearest rib where the board is flat
+/// and no rib reaches the point, or `None` off the board.
 ///
 /// # Panics
 ///
 /// If the spine has no nodes.
-pub fn rib_foot(spine: &Spine, y: f64, z: f64) -> f64 {
-    let excess = |node: usize| edge_foot(spine.u[node], spine.rib_slope[node], z) - y;
-    let (mut low, mut high) = (0, spine.u.len() - 1);
-    if excess(low) >= 0.0 {
-        return spine.u[low];
-    }
-    if excess(high) <= 0.0 {
-        return spine.u[high];
-    }
-    while high - low > 1 {
-        let middle = low.midpoint(high);
-        if excess(middle) < 0.0 {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    let fraction = excess(low) / (excess(low) - excess(high));
-    spine.u[low] + fraction * (spine.u[high] - spine.u[low])
+pub fn rib_foot(spine: &Spine, y: f64, z: f64) -> Option<f64> {
+    locate(spine, &Vector2::new(y, z)).map(|place| place.foot.point.u)
 }
 
 #[cfg(test)]
