@@ -385,16 +385,19 @@ impl<'a> Window<'a> {
         [first, last].into_iter().flatten().find(is_near)
     }
 
+    /// Where the line crosses the window, if it does: on the first piece that ends ahead of it.
     fn on_piece(&self, point: &Vector2<f64>) -> Option<End> {
         let ahead = |index: usize, at: f64| self.ahead(&self.chain[index].curve.point(at), point);
-        let crossed = |&&(index, [from, to]): &&(usize, [f64; 2])| {
-            ahead(index, from) <= 0.0 && ahead(index, to) >= 0.0
-        };
-        let &(index, [from, to]) = self.pieces.iter().find(crossed)?;
+        let &(first, [start, _]) = self.pieces.first()?;
+        if ahead(first, start) > 0.0 {
+            return None;
+        }
+        let ends_ahead = |&&(index, [_, to]): &&(usize, [f64; 2])| ahead(index, to) >= 0.0;
+        let &(index, [from, to]) = self.pieces.iter().find(ends_ahead)?;
         let fraction = match self.chain[index].curve.circle() {
             None => {
                 let (a, b) = (ahead(index, 0.0), ahead(index, 1.0));
-                if a == b { 0.0 } else { a / (a - b) }
+                if a < 0.0 { a / (a - b) } else { 0.0 }
             }
             Some(_) => root(|at| ahead(index, at), from, to),
         };

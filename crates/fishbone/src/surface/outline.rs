@@ -156,7 +156,7 @@ impl Chains {
                 segments: &segments,
                 distance: side * 0.5 * spine.width,
             };
-            mended(builder.edges(is_open), 1e-9 * spine.width)
+            mended(builder.edges(is_open), is_open, 1e-9 * spine.width)
         };
         Self {
             edges: [chain(-1.0), chain(1.0)],
@@ -278,9 +278,9 @@ struct Cut {
 
 /// The chain without gaps: at each, the nearest pieces that cross are cut at their crossing, and what is between them
 /// is left out.
-fn mended(mut edges: Vec<Edge>, tolerance: f64) -> Vec<Edge> {
+fn mended(mut edges: Vec<Edge>, is_open: bool, tolerance: f64) -> Vec<Edge> {
     while !gaps(&edges, tolerance).is_empty() {
-        let Some(cut) = nearest_cut(&edges, &gaps(&edges, tolerance)) else {
+        let Some(cut) = nearest_cut(&edges, &gaps(&edges, tolerance), is_open) else {
             bridge(&mut edges, tolerance);
             break;
         };
@@ -303,14 +303,14 @@ fn gaps(edges: &[Edge], tolerance: f64) -> Vec<usize> {
 }
 
 /// The cut across a gap that leaves out the fewest pieces, and of those the least length.
-fn nearest_cut(edges: &[Edge], gaps: &[usize]) -> Option<Cut> {
+fn nearest_cut(edges: &[Edge], gaps: &[usize], is_open: bool) -> Option<Cut> {
     (1..edges.len()).find_map(|span| {
         let befores = |gap: usize| (gap + 1).saturating_sub(span)..=gap;
         let cuts = gaps
             .iter()
             .flat_map(|&gap| befores(gap))
             .filter(|before| before + span < edges.len())
-            .flat_map(|before| cuts(edges, before, before + span));
+            .flat_map(|before| cuts(edges, [before, before + span], is_open));
         let lost = |cut: &Cut| {
             (1.0 - cut.at[0]) * edges[cut.before].curve.length()
                 + cut.at[1] * edges[cut.after].curve.length()
@@ -319,9 +319,21 @@ fn nearest_cut(edges: &[Edge], gaps: &[usize]) -> Option<Cut> {
     })
 }
 
-fn cuts(edges: &[Edge], before: usize, after: usize) -> Vec<Cut> {
-    let crossings = edges[before].curve.crossings(&edges[after].curve);
-    let cut = |at| Cut { before, after, at };
+/// The cuts at the crossings of two pieces; end lines, whose corner may be gone, reach farther out than their own.
+fn cuts(edges: &[Edge], [before, after]: [usize; 2], is_open: bool) -> Vec<Cut> {
+    let reach = |index: usize| match is_open {
+        true if index == 0 => [0.0, 4.0],
+        true if index == edges.len() - 1 => [-3.0, 1.0],
+        _ => [0.0, 1.0],
+    };
+    let reached = |index: usize| edges[index].curve.part(reach(index)[0], reach(index)[1]);
+    let own = |index: usize, at: f64| reach(index)[0] + at * (reach(index)[1] - reach(index)[0]);
+    let crossings = reached(before).crossings(&reached(after));
+    let cut = |at: [f64; 2]| Cut {
+        before,
+        after,
+        at: [own(before, at[0]), own(after, at[1])],
+    };
     crossings.into_iter().map(cut).collect()
 }
 

@@ -119,16 +119,16 @@ pub(super) fn edge_points(
 ) -> Vec<Vector2<f64>> {
     let chain = &board.chains.edges[side];
     let mut points = Vec::new();
-    for index in (from.floor() as usize)..chain.len() {
+    for (index, edge) in chain.iter().enumerate().skip(from.floor() as usize) {
         let start = index as f64;
         let (a, b) = ((from - start).max(0.0), (to - start).min(1.0));
         if a >= b {
             break;
         }
         if a == 0.0 && start > from {
-            points.push(chain[index].curve.first());
+            points.push(edge.curve.first());
         }
-        let part = chain[index].curve.part(a, b);
+        let part = edge.curve.part(a, b);
         let count = match part.circle() {
             None => 1,
             Some(_) => (part.length() / step).ceil().max(1.0) as usize,
