@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
-from scipy.integrate import solve_ivp
+from scipy.integrate import solve_bvp, solve_ivp
 from scipy.interpolate import CubicHermiteSpline
 from scipy.linalg import expm
 from scipy.optimize import brentq
@@ -416,3 +416,276 @@ def distance_to_shell(name: str, energy: Energy) -> float:
 def observed_orders(errors: Array) -> Array:
     """log₂ of the ratio of successive errors, the element number doubling from one to the next."""
     return np.asarray(np.log2(errors[:-1] / errors[1:]), dtype=np.float64)
+
+
+# ------------------------------------------------------------------------- boards of several segments, loads, links
+
+SAME_PLACE = 1e-9
+
+
+def straight(length: float, **options: Any) -> Json:
+    """A straight strip; `natural_bend` and `rigidity` are its options."""
+    return {"kind": "straight", "length": length, **options}
+
+
+def arc(length: float, curvature: float, **options: Any) -> Json:
+    """A strip curved in its plane: positive turns η towards ζ."""
+    return {"kind": "arc", "length": length, "curvature": curvature, **options}
+
+
+def corner(angle: float) -> Json:
+    """A bend of the board: positive turns η towards ζ."""
+    return {"kind": "corner", "angle": angle}
+
+
+def rigid(length: float) -> Json:
+    """A stiffener."""
+    return {"kind": "rigid", "length": length}
+
+
+def board(
+    segments: list[Json],
+    supports: list[Json],
+    *,
+    energy: Energy = "wunderlich",
+    width: float = 0.1,
+    rigidity: float | None = 1.0,
+    elements: int | None = None,
+    bulge: Any = None,
+    gravity: Any = None,
+    points: list[Json] | None = None,
+    links: list[Json] | None = None,
+    **fields: Any,
+) -> Json:
+    """A belt of any segments under any loads; `fields` go to `[belt]`."""
+    scenario = belt(supports, energy=energy, width=width, rigidity=rigidity, elements=elements, bulge=bulge)
+    scenario["belt"].update(fields, segments=segments)
+    loads: Json = {}
+    if gravity is not None:
+        loads["gravity"] = numbers(gravity)
+    if points is not None:
+        loads["points"] = points
+    if loads:
+        scenario["loads"] = loads
+    if links is not None:
+        scenario["links"] = links
+    return scenario
+
+
+def total_length(scenario: Json) -> float:
+    return float(sum(segment.get("length", 0.0) for segment in scenario["belt"]["segments"]))
+
+
+def place(scenario: Json, at: str | float) -> float:
+    """The arc length of a place that may be called "start" or "end"."""
+    if isinstance(at, str):
+        return {"start": 0.0, "end": total_length(scenario)}[at]
+    return float(at)
+
+
+def node_at(equilibrium: fb.Equilibrium, u: float) -> int:
+    """The last node at u: after a joint, where nodes are repeated."""
+    nodes = np.flatnonzero(np.abs(equilibrium.u - u) < SAME_PLACE)
+    assert nodes.size > 0, f"no node at {u}"
+    return int(nodes[-1])
+
+
+def joints(equilibrium: fb.Equilibrium) -> Array:
+    """Nodes k whose next node is at the same place: the belt before and after a joint."""
+    return np.flatnonzero(np.diff(equilibrium.u) < SAME_PLACE)
+
+
+def elements_of(equilibrium: fb.Equilibrium) -> Array:
+    """First nodes of the elements, joints left out."""
+    return np.flatnonzero(np.diff(equilibrium.u) >= SAME_PLACE)
+
+
+def spine_at(equilibrium: fb.Equilibrium, places: Any) -> Array:
+    """The spine by a cubic Hermite in every element, so that it may have joints.
+
+    Shapes: (m,) -> (m, 3)
+    """
+    u, x, tangent = equilibrium.u, equilibrium.position, equilibrium.frame[:, :, 1]
+    first = elements_of(equilibrium)
+    at = np.atleast_1d(np.asarray(places, dtype=np.float64))
+    k = first[np.clip(np.searchsorted(u[first], at, side="right") - 1, 0, first.size - 1)]
+    h = (u[k + 1] - u[k])[:, None]
+    t = (at - u[k])[:, None] / h
+    return np.asarray(
+        (1.0 + 2.0 * t) * (1.0 - t) ** 2 * x[k]
+        + t * (1.0 - t) ** 2 * h * tangent[k]
+        + t**2 * (3.0 - 2.0 * t) * x[k + 1]
+        - t**2 * (1.0 - t) * h * tangent[k + 1],
+        dtype=np.float64,
+    )
+
+
+def spine_integrals(equilibrium: fb.Equilibrium) -> Array:
+    """∫ x du over every element by the same Hermite: h/2 (x₀ + x₁) + h²/12 (η₀ − η₁); nothing over a joint.
+
+    Shapes: (n - 1, 3)
+    """
+    h = np.diff(equilibrium.u)[:, None]
+    x, tangent = equilibrium.position, equilibrium.frame[:, :, 1]
+    return np.asarray(h / 2.0 * (x[:-1] + x[1:]) + h**2 / 12.0 * (tangent[:-1] - tangent[1:]), dtype=np.float64)
+
+
+def load_points(equilibrium: fb.Equilibrium, scenario: Json) -> list[tuple[float, Array, Array]]:
+    """Place, force and where it acts, x + Rℓ, of the loads at points."""
+    loads = []
+    for point in scenario.get("loads", {}).get("points", []):
+        u = place(scenario, point["at"])
+        k = node_at(equilibrium, u)
+        lever = np.asarray(point.get("lever", ORIGIN), dtype=np.float64)
+        acts_at = equilibrium.position[k] + equilibrium.frame[k] @ lever
+        loads.append((u, np.asarray(point["force"], dtype=np.float64), acts_at))
+    return loads
+
+
+def gravity_of(scenario: Json) -> Array:
+    return np.asarray(scenario.get("loads", {}).get("gravity") or ORIGIN, dtype=np.float64)
+
+
+def mass_per_length(equilibrium: fb.Equilibrium, scenario: Json) -> float:
+    """`density`, or else what the potential of the result implies: of presets the tests know no numbers."""
+    gravity = gravity_of(scenario)
+    if not np.any(gravity):
+        return 0.0
+    if "material" not in scenario["belt"] and "layers" not in scenario["belt"]:
+        return float(scenario["belt"].get("density", 0.0))
+    potential = equilibrium.energy - equilibrium.elastic_energy
+    potential += sum(float(force @ at) for _, force, at in load_points(equilibrium, scenario))
+    return float(-potential / (np.sum(spine_integrals(equilibrium), axis=0) @ gravity))
+
+
+def load_potential(equilibrium: fb.Equilibrium, scenario: Json) -> float:
+    """−∫ ρ g·x du − Σ F·(x + Rℓ) (MODEL §2)."""
+    weight = mass_per_length(equilibrium, scenario) * gravity_of(scenario)
+    hung = sum(float(force @ at) for _, force, at in load_points(equilibrium, scenario))
+    return float(-np.sum(spine_integrals(equilibrium), axis=0) @ weight - hung)
+
+
+def wrench(force: Array, acts_at: Array, moment: Any = ORIGIN) -> Array:
+    """Force, and moment about the origin.
+
+    Shapes: (6,)
+    """
+    return np.concatenate([force, np.asarray(moment, dtype=np.float64) + np.cross(acts_at, force)])
+
+
+def applied_wrenches(equilibrium: fb.Equilibrium, scenario: Json) -> list[tuple[float, Array]]:
+    """Place and wrench about the origin of all that acts on the belt at points: supports, links, loads.
+
+    A link acts with its force at `to` and against it at `from`.
+    """
+    output = result(equilibrium)
+    acting = [(u, wrench(force, at)) for u, force, at in load_points(equilibrium, scenario)]
+    for support_ in output["supports"]:
+        u = place(scenario, support_["at"])
+        position = equilibrium.position[node_at(equilibrium, u)]
+        acting.append((u, wrench(np.asarray(support_["force"]), position, support_["moment"])))
+    for link, reaction in zip(scenario.get("links", []), output.get("links", []), strict=True):
+        for at, sign in ((link["to"], 1.0), (link["from"], -1.0)):
+            u = place(scenario, at)
+            position = equilibrium.position[node_at(equilibrium, u)]
+            acting.append((u, wrench(sign * np.asarray(reaction["force"]), position)))
+    return acting
+
+
+def weight_beyond(equilibrium: fb.Equilibrium, scenario: Json) -> Array:
+    """Wrench about the origin of the weight of what lies beyond every node.
+
+    Shapes: (n, 6)
+    """
+    weight = mass_per_length(equilibrium, scenario) * gravity_of(scenario)
+    force = np.diff(equilibrium.u)[:, None] * weight
+    moment = np.cross(spine_integrals(equilibrium), weight)
+    per_element = np.concatenate([np.hstack([force, moment]), np.zeros((1, 6))])
+    return np.asarray(np.cumsum(per_element[::-1], axis=0)[::-1], dtype=np.float64)
+
+
+def internal_wrenches(equilibrium: fb.Equilibrium) -> Array:
+    """Internal force, and moment about the origin, at the nodes.
+
+    Shapes: (n, 6)
+    """
+    force, moment = internal(equilibrium)
+    return np.hstack([force, moment + np.cross(equilibrium.position, force)])
+
+
+# -------------------------------------------------------------------------------------- planar cantilevers, by SciPy
+
+
+@dataclass(frozen=True)
+class Cantilever:
+    """A planar elastica clamped at u = 0 in the natural pose, under its own weight, a tip force and a natural bend.
+
+    Let ψ be the angle by which the frame has turned about +z: x' = −sin ψ, y' = cos ψ, ω_ζ = ψ'. With weight q du along
+    −x, force (X, Y) at the tip plus the body lever (a, b) and flexural rigidity R(u) the potential
+
+        ∫ [R/2 (ψ' − k)² + q x] du − X (x + a cos ψ − b sin ψ) − Y (y + a sin ψ + b cos ψ)    (tip values)
+
+    is stationary where
+
+        m' = X cos ψ + Y sin ψ − q (U − u) cos ψ,   m = R (ψ' − k),   ψ(0) = 0,
+        m(U) = −X (a sin ψ + b cos ψ) + Y (a cos ψ − b sin ψ).
+    """
+
+    weight: float = 0.0
+    force: tuple[float, float] = (0.0, 0.0)
+    lever: tuple[float, float] = (0.0, 0.0)
+    rigidity: tuple[float, float] = (1.0, 1.0)
+    natural_bend: float = 0.0
+    length: float = 1.0
+
+    @functools.cached_property
+    def states(self) -> Any:
+        """ψ, m, x, y, energy as functions of u, by collocation (scipy.integrate.solve_bvp)."""
+        u = np.linspace(0.0, self.length, 201)
+        guess = np.vstack([np.zeros_like(u), np.zeros_like(u), np.zeros_like(u), u, np.zeros_like(u)])
+        for share in np.linspace(0.1, 1.0, 10):
+            solution = solve_bvp(
+                functools.partial(self._rate, share=share),
+                functools.partial(self._conditions, share=share),
+                u,
+                guess,
+                tol=1e-9,
+                max_nodes=100_000,
+            )
+            assert solution.success, solution.message
+            guess = solution.sol(u)
+        return solution.sol
+
+    def _rate(self, u: Array, state: Array, *, share: float) -> Array:
+        angle, moment = state[0], state[1]
+        rigidity = self.rigidity[0] + (self.rigidity[1] - self.rigidity[0]) * u / self.length
+        push, pull = share * self.force[0], share * self.force[1]
+        hanging = share * self.weight * (self.length - u)
+        return np.vstack(
+            [
+                moment / rigidity + self.natural_bend,
+                (push - hanging) * np.cos(angle) + pull * np.sin(angle),
+                -np.sin(angle),
+                np.cos(angle),
+                0.5 * moment**2 / rigidity,
+            ]
+        )
+
+    def _conditions(self, start: Array, end: Array, *, share: float) -> Array:
+        (push, pull), (a, b) = self.force, self.lever
+        cosine, sine = np.cos(end[0]), np.sin(end[0])
+        turning = -push * (a * sine + b * cosine) + pull * (a * cosine - b * sine)
+        return np.array([start[0], end[1] - share * turning, start[2], start[3], start[4]])
+
+    def position(self, u: Any) -> Array:
+        """Shapes: (n,) -> (n, 3)"""
+        state = self.states(np.atleast_1d(np.asarray(u, dtype=np.float64)))
+        return np.column_stack([state[2], state[3], np.zeros_like(state[2])])
+
+    @property
+    def tip(self) -> Array:
+        return self.position(self.length)[0]
+
+    @property
+    def elastic_energy(self) -> float:
+        return float(self.states(self.length)[4])
