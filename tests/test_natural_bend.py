@@ -157,7 +157,8 @@ def test_curled_belt_clamped_flat_stores_half_its_curvature_squared(energy: Ener
     """ω_ζ = 0: R_f k² U/2, no force along, and a moment −R_f k about ζ all along.
 
     A straight belt does not give way in its plane nor, with square ribs, to twist: the force along z and the moments
-    about x and y are not determined, and hardly leaning ribs let them into the others. (A belt of more curl, k U = 0.6, can do with less by twisting out of the plane.)
+    about x and y are not determined, and hardly leaning ribs let them into the others. (A belt of more curl, k U = 0.6,
+    can do with less by twisting out of the plane.)
     """
     equilibrium = solve(flattened(energy, curl))
     force, moment = internal(equilibrium)

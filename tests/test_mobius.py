@@ -1,0 +1,201 @@
+"""Closed belts: the ring and the Möbius band.
+
+Starostin & van der Heijden (2007): a band of length 2π and half-width w = π/30 has energy/(D w) = 18.63 (they print it
+over π). With D = 1 the rigidity of the whole width is R_f = V = π/15.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fishbone as fb
+from helpers import (
+    ENERGIES,
+    Array,
+    Energy,
+    Json,
+    board,
+    internal_wrenches,
+    numbers,
+    result,
+    rotation_vector,
+    solve,
+    straight,
+    support,
+)
+
+LENGTH = 2.0 * math.pi
+HALF_WIDTH = math.pi / 30.0
+WUNDERLICH = 18.63
+ELEMENTS = 400
+HALF_TURN_ABOUT_TANGENT = np.diag([-1.0, 1.0, -1.0])
+SEAM_ERROR = 1e-7
+
+signs = pytest.mark.parametrize("sign", [1, -1])
+energy_model = pytest.mark.parametrize("energy", ENERGIES)
+
+
+def closed(
+    half_turns: int | None,
+    supports: list[Json] | None = None,
+    *,
+    energy: Energy = "wunderlich",
+    elements: int = ELEMENTS,
+    **fields: Any,
+) -> Json:
+    turns = {} if half_turns is None else {"half_turns": half_turns}
+    return board(
+        [straight(LENGTH)],
+        supports or [],
+        energy=energy,
+        width=2.0 * HALF_WIDTH,
+        rigidity=2.0 * HALF_WIDTH,
+        elements=elements,
+        closed=True,
+        **turns,
+        **fields,
+    )
+
+
+def total_torsion(equilibrium: fb.Equilibrium) -> float:
+    """∫ ω_η du."""
+    torsion = equilibrium.torsion
+    return float(np.sum(0.5 * np.diff(equilibrium.u) * (torsion[:-1] + torsion[1:])))
+
+
+def distances(equilibrium: fb.Equilibrium) -> Array:
+    """Every eighth node's distance from every other: the shape without its place."""
+    x = equilibrium.position[::8]
+    return np.asarray(np.linalg.norm(x[:, None] - x[None, :], axis=2), dtype=np.float64)
+
+
+# ------------------------------------------------------------------------------------------------------------ ring
+
+
+@energy_model
+@pytest.mark.parametrize("half_turns", [0, None])
+def test_closed_belt_without_a_twist_is_a_circle(energy: Energy, half_turns: int | None) -> None:
+    """Energy R_f/2 (2π/L)² L; every node at L/2π from the centre."""
+    equilibrium = solve(closed(half_turns, energy=energy, elements=100))
+    assert equilibrium.energy == pytest.approx(HALF_WIDTH * LENGTH, rel=1e-9)
+    assert np.abs(equilibrium.bend) == pytest.approx(1.0, abs=1e-6)
+    centre = np.mean(equilibrium.position[:-1], axis=0)
+    assert np.linalg.norm(equilibrium.position - centre, axis=1) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_ring_starts_in_the_natural_pose_where_nothing_holds_it() -> None:
+    """CONTRACT: without any support the start is held where it is, and takes no force."""
+    equilibrium = solve(closed(0, elements=100))
+    assert equilibrium.position[0] == pytest.approx([0.0, 0.0, 0.0], abs=1e-9)
+    assert np.max(np.abs(equilibrium.frame[0] - np.eye(3))) < 1e-9
+    for reaction in result(equilibrium)["supports"]:
+        assert np.max(np.abs([reaction["force"], reaction["moment"]])) < 1e-6
+
+
+def test_ring_of_rolled_belt_costs_nothing() -> None:
+    """Natural bend 2π/L, towards −ξ or +ξ: the ring may close round either way, and takes the free one."""
+    for curl in (1.0, -1.0):
+        equilibrium = solve(closed(0, elements=100, natural_bend=curl))
+        assert equilibrium.elastic_energy == pytest.approx(0.0, abs=1e-9)
+        assert equilibrium.bend == pytest.approx(curl, abs=1e-5)
+
+
+# ----------------------------------------------------------------------------------------------------- Möbius band
+
+
+@signs
+def test_moebius_band_has_the_published_energy(sign: int) -> None:
+    """18.63 at 400 elements; 18.631 in an independent transcription."""
+    energy = solve(closed(sign)).energy
+    assert energy / HALF_WIDTH == pytest.approx(WUNDERLICH, abs=0.05)
+
+
+@signs
+def test_moebius_band_closes(sign: int) -> None:
+    """x(U) = x(0); the frame comes back turned by π about η."""
+    equilibrium = solve(closed(sign))
+    assert np.max(np.abs(equilibrium.position[-1] - equilibrium.position[0])) < SEAM_ERROR
+    turned = equilibrium.frame[0] @ HALF_TURN_ABOUT_TANGENT
+    assert np.max(np.abs(equilibrium.frame[-1] - turned)) < SEAM_ERROR
+
+
+@signs
+def test_fields_of_a_moebius_band_change_sign_at_the_seam(sign: int) -> None:
+    """ω_ζ and β are antiperiodic, so that ω_η = −βω_ζ is periodic."""
+    equilibrium = solve(closed(sign))
+    for field in (equilibrium.bend, equilibrium.rib_slope):
+        assert abs(float(field[-1] + field[0])) < SEAM_ERROR
+    assert abs(float(equilibrium.torsion[-1] - equilibrium.torsion[0])) < SEAM_ERROR
+
+
+def test_left_and_right_handed_moebius_bands_are_twins() -> None:
+    """Mirror images: the same energy and distances between points, opposite torsion."""
+    right, left = solve(closed(1)), solve(closed(-1))
+    assert left.energy == pytest.approx(right.energy, rel=1e-6)
+    assert total_torsion(left) == pytest.approx(-total_torsion(right), rel=1e-2)
+    assert abs(total_torsion(right)) > 1.0
+    # The seam may sit elsewhere along the band: what is compared does not depend on it.
+    assert float(np.mean(distances(left))) == pytest.approx(float(np.mean(distances(right))), rel=1e-4)
+
+
+@pytest.mark.parametrize("half_turns", [0, 1, -1])
+def test_result_says_with_how_many_half_turns_it_ended(half_turns: int) -> None:
+    """The twist asked for is where it starts; what it ended with stands in the result."""
+    elements = 100 if half_turns == 0 else ELEMENTS
+    assert result(solve(closed(half_turns, elements=elements)))["half_turns"] == half_turns
+
+
+def test_moebius_band_is_a_minimum() -> None:
+    """MODEL §6: the flip-symmetric state; moving the seam along the band is free."""
+    assert solve(closed(1)).stable is not False
+
+
+def test_moebius_band_is_in_balance_with_itself() -> None:
+    """The internal wrench is one and the same all along, through the seam."""
+    wrenches = internal_wrenches(solve(closed(1)))
+    assert np.max(np.abs(wrenches - wrenches[0])) < 1e-6 * np.max(np.abs(wrenches))
+
+
+# ------------------------------------------------------------------------------------------------------- the seam
+
+
+def test_seam_may_lie_anywhere() -> None:
+    """Held by the pose that it has at 0.3 U, or made to lie where the rib is square: the energy is the same to 1e-6."""
+    free = solve(closed(1))
+    k = int(np.argmin(np.abs(free.u - 0.3 * LENGTH)))
+    pose = support("start", free.position[k], rotation_vector(free.frame[k]), square_rib=False)
+    square = support("start", numbers([0.0] * 3), numbers([0.0] * 3), square_rib=True)
+    for held in (pose, square):
+        equilibrium = solve(closed(1, [held]))
+        assert equilibrium.energy == pytest.approx(free.energy, rel=1e-6)
+        assert np.max(np.abs(equilibrium.position[-1] - equilibrium.position[0])) < SEAM_ERROR
+
+
+def test_support_of_a_closed_belt_holds_nothing() -> None:
+    """One pose given is no more than where the band is: no force, no moment, wherever along it."""
+    pose = ((0.2, -0.1, 0.3), (0.3, 0.1, -0.2))
+    for at in ("start", 0.3 * LENGTH):
+        table: Json = {**support("start", *pose, square_rib=False), "at": at}
+        equilibrium = solve(closed(1, [table]))
+        reaction = result(equilibrium)["supports"][0]
+        assert equilibrium.energy / HALF_WIDTH == pytest.approx(WUNDERLICH, abs=0.05)
+        assert np.max(np.abs([reaction["force"], reaction["moment"]])) < 1e-5
+        k = int(np.argmin(np.abs(equilibrium.u - (0.0 if at == "start" else at))))
+        assert equilibrium.position[k] == pytest.approx(pose[0], abs=1e-8)
+
+
+def test_closed_belt_can_be_pulled_apart_by_its_supports() -> None:
+    """A ring held at opposite points, farther apart than its diameter: equal and opposite pulls at more energy."""
+    supports = [
+        {"at": 0.0, "position": [0.0, 0.0, 0.0]},
+        {"at": LENGTH / 2.0, "position": [2.4, 0.0, 0.0]},
+    ]
+    pulled = solve(closed(0, supports, elements=100))
+    forces = [np.array(entry["force"]) for entry in result(pulled)["supports"]]
+    assert np.max(np.abs(forces[0] + forces[1])) < 1e-6
+    assert forces[1][0] > 1e-3
+    assert pulled.energy > HALF_WIDTH * LENGTH * 1.05
