@@ -76,6 +76,8 @@ pub struct Equilibrium {
     pub reactions: Vec<Reaction>,
     /// What each link does to the belt, in the order of the scenario.
     pub links: Vec<LinkForce>,
+    /// Signed half turns of a closed belt as it ended, `None` of an open one.
+    pub half_turns: Option<i32>,
     /// Whether the equilibrium is a local minimum, where known.
     pub stable: Option<bool>,
     /// How far the shape is from a solution of its discrete equations, lengths in U and energy in mean R_f/U.

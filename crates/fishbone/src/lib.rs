@@ -34,6 +34,7 @@ pub mod equilibrium;
 pub mod error;
 mod guess;
 pub mod lie;
+pub mod linking;
 pub mod material;
 pub mod program;
 pub mod result;

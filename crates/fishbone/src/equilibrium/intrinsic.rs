@@ -4,10 +4,12 @@ use super::assembly::Assembly;
 use super::search::Search;
 use super::{Equilibrium, LinkForce, Reaction, Status, Units, Wrench, excess_distance, is_taut};
 use crate::belt::Belt;
+use crate::guess::{disturb, guess};
 use crate::lie::Pose;
+use crate::linking::half_turns;
 use crate::program::{self, BeltPoint, BeltProgram};
 use crate::scenario::{Scenario, SupportSpec};
-use crate::solver::{Curvature, Outcome, Solution};
+use crate::solver::{Curvature, Outcome, Solution, dependent_constraints};
 use crate::spine::{Piece, Spine};
 use nalgebra::Vector3;
 use std::ops::ControlFlow;
@@ -32,9 +34,10 @@ pub(super) fn solve(
         Some(_) => search.start(&program),
         None => search.run(&program, coarse.as_ref(), proceed),
     };
+    let said_twice = said_twice(scenario, &program, &search.bulge);
     let (status, message) = match excess {
         Some(message) => (Status::Infeasible, message),
-        None => judge(&solution, search.tolerance),
+        None => judge(&solution, search.tolerance, said_twice.as_deref()),
     };
     let stable = stable(status, solution.curvature);
     let spine = units.spine(&program, &solution.point, belt, &assembly.origin);
@@ -43,7 +46,12 @@ pub(super) fn solve(
     Equilibrium {
         status,
         message,
-        warnings: warnings(scenario, &program, is_taut(scenario, units.length), stable),
+        warnings: [
+            warnings(scenario, &program, stable),
+            doubts(scenario, status, said_twice, half_turns(&spine)),
+        ]
+        .concat(),
+        half_turns: half_turns(&spine),
         energy: solution.values.objective * units.energy + assembly.potential_of_origin(),
         elastic_energy: program.elastic_energy(&solution.point.fields) * units.energy,
         torsion: spine.torsion(),
@@ -63,8 +71,44 @@ pub(super) fn solve(
     }
 }
 
+/// The supports and links that hold the same twice over, by name; `None` where all are independent.
+///
+/// Two supports, one at either end of a belt that bends, always are.
+fn said_twice(scenario: &Scenario, program: &BeltProgram, bulge: &Vector3<f64>) -> Option<String> {
+    let rigid = program
+        .pieces
+        .iter()
+        .any(|piece| matches!(piece, program::Piece::Rigid { .. }));
+    let (supports, links) = (scenario.supports.len(), scenario.links.len());
+    if supports <= 2 && links == 0 && !rigid || scenario.belt.closed {
+        return None;
+    }
+    // In general position: some constraints depend on each other on the straight belt and nowhere else.
+    let general = disturb(program, &guess(program, bulge), 0.3);
+    let name = |i: usize| match i.checked_sub(program.supports.len()) {
+        None if i < supports => Some(format!("supports[{i}]")),
+        Some(link) if link < links => Some(format!("links[{link}]")),
+        _ => None,
+    };
+    let dependent = dependent_constraints(program, &general);
+    let names: Vec<_> = dependent.into_iter().filter_map(name).collect();
+    (!names.is_empty()).then(|| names.join(" and "))
+}
+
 /// Status and message of a search that was not infeasible from the outset.
-fn judge(solution: &Solution<BeltPoint>, tolerance: f64) -> (Status, String) {
+fn judge(
+    solution: &Solution<BeltPoint>,
+    tolerance: f64,
+    said_twice: Option<&str>,
+) -> (Status, String) {
+    if let (Some(names), false) = (said_twice, solution.outcome == Outcome::Converged) {
+        return (
+            Status::Infeasible,
+            format!(
+                "{names} contradict each other: they hold the same twice over, and not alike; leave one out"
+            ),
+        );
+    }
     let largest = solution.residuals.largest();
     let (iterations, violation) = (solution.iterations, solution.residuals.constraint);
     match solution.outcome {
@@ -107,12 +151,26 @@ fn judge(solution: &Solution<BeltPoint>, tolerance: f64) -> (Status, String) {
     }
 }
 
-fn warnings(
+/// What should be known of constraints and turns before the result is relied on.
+fn doubts(
     scenario: &Scenario,
-    program: &BeltProgram,
-    taut: bool,
-    stable: Option<bool>,
+    status: Status,
+    said_twice: Option<String>,
+    half_turns: Option<i32>,
 ) -> Vec<String> {
+    let said = said_twice
+        .filter(|_| status == Status::Converged)
+        .map(|names| {
+            format!("{names} hold the same twice over: what each of them bears is not determined")
+        });
+    let asked = scenario.belt.half_turns.unwrap_or(0);
+    let passed = half_turns.filter(|made| *made != asked).map(|made| {
+        format!("the belt has passed through itself: it was given {asked} half turns and ended with {made}")
+    });
+    said.into_iter().chain(passed).collect()
+}
+
+fn warnings(scenario: &Scenario, program: &BeltProgram, stable: Option<bool>) -> Vec<String> {
     // Strong twist makes facets of the scale of V, which longer elements cannot resolve.
     const SAFE: f64 = 8.0;
     let shares = program
@@ -120,6 +178,7 @@ fn warnings(
         .map(|(_, e)| e.length / (2.0 * e.half_width));
     let longest = shares.fold(0.0, f64::max);
     let coarse = longest * SAFE > 1.0 + 1e-9;
+    let taut = is_taut(scenario, scenario.belt.length());
     let saddle = stable == Some(false);
     let turned = scenario
         .supports

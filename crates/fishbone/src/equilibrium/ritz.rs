@@ -95,6 +95,7 @@ fn report(scenario: &Scenario, belt: &Belt, start: &Pose, solution: &Solution) -
         internal: Vec::new(),
         reactions: Vec::new(),
         links: Vec::new(),
+        half_turns: None,
         stable: None,
         residuals: Residuals {
             stationarity: solution.stationarity,
