@@ -227,7 +227,6 @@ BOARDS = (
 )
 
 OUTSIDE = (
-    Case("gravity without mass", put("loads", {"gravity": [0.0, 0.0, -9.81]}), ("loads.gravity", "density")),
     Case(
         "point load off the belt",
         put("loads", {"points": [{"at": 1.5, "force": [0.0, 0.0, -1.0]}]}),

@@ -160,10 +160,13 @@ fn excess_distance(scenario: &Scenario, length: f64) -> Option<String> {
     let mut spans = scenario
         .supports
         .windows(2)
-        .map(|pair| Span::between(pair, length));
-    if let Some(span) = spans.find(|span| span.excess() > span.rounding) {
+        .map(|pair| Span::between(pair, length))
+        .enumerate();
+    if let Some((i, span)) = spans.find(|(_, span)| span.excess() > span.rounding) {
         return Some(format!(
-            "supports at u = {} and u = {} are {} apart, {} more than the belt between them ({}); move them closer",
+            "supports[{i}] and supports[{}], at u = {} and u = {}, are {} apart, {} more than the belt between them ({}); \
+             move them closer",
+            i + 1,
             number(span.u[0]),
             number(span.u[1]),
             number(span.distance),

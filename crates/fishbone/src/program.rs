@@ -4,9 +4,11 @@
 //! search is a belt without a break, and the conditions of supports and links are the only equations left. In the same
 //! way the rib slope is carried across a bend of the board, where the rib is one material line.
 
+mod link;
 mod load;
 mod support;
 
+pub use link::{NodeLink, Tie};
 pub use load::{DeadForce, NodeLoad};
 pub use support::{Hold, NodeSupport};
 
@@ -14,7 +16,7 @@ use crate::element::{Element, IncrementJet, Jet};
 use crate::energy::EnergyModel;
 use crate::lie::{Pose, hat};
 use crate::solver::chain::{NodeVector, Stage};
-use crate::solver::{Bounds, Linearisation, Program, Rows, RowsByNode, Values};
+use crate::solver::{Bounds, Linearisation, Program, Rows, Values};
 use crate::spine::turn;
 use nalgebra::{Matrix3, Matrix4, Rotation3, UnitQuaternion, Vector2, Vector3, Vector4};
 
@@ -35,17 +37,6 @@ pub enum Piece {
     },
 }
 
-/// Conditions between two nodes.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct NodeLink {
-    /// The two nodes.
-    pub nodes: [usize; 2],
-    /// From the first one's position to the second one's, Eq. (35).
-    pub offset: Vector3<f64>,
-    /// Factors by which bend and slope of the second are those of the first, where they are tied at all.
-    pub fields: [Option<f64>; 2],
-}
-
 /// The programme of a belt. Lengths are in U and energies in mean R_f/U.
 #[derive(Debug, Clone)]
 pub struct BeltProgram {
@@ -61,8 +52,7 @@ pub struct BeltProgram {
     pub loads: Vec<NodeLoad>,
     /// Weight per unit length, world axes.
     pub weight: Vector3<f64>,
-    /// Signed half turns after which the end of a closed belt joins its start. The seam is then the last of the supports,
-    /// which holds the end's frame, and the last of the links.
+    /// Signed half turns after which the end of a closed belt joins its start; the ties of its seam are among the links.
     pub half_turns: Option<i32>,
     /// Bend and rib slope of every node where they are prescribed.
     fixed: Vec<[Option<f64>; 2]>,
@@ -121,32 +111,6 @@ pub fn slope_beyond(slope: f64, angle: f64) -> Option<[f64; 3]> {
     })
 }
 
-impl NodeLink {
-    fn value(&self, point: &BeltPoint) -> Rows {
-        let [a, b] = self.nodes;
-        let mut rows = Rows::zeros();
-        let gap = point.poses[b].position - point.poses[a].position - self.offset;
-        rows.fixed_rows_mut::<3>(0).copy_from(&gap);
-        for (i, factor) in self.fields.iter().enumerate() {
-            rows[3 + i] = factor.map_or(0.0, |f| point.fields[b][i] - f * point.fields[a][i]);
-        }
-        rows
-    }
-
-    fn jacobian(&self) -> [RowsByNode; 2] {
-        let mut by = [RowsByNode::zeros(); 2];
-        for i in 0..3 {
-            (by[0][(i, i)], by[1][(i, i)]) = (-1.0, 1.0);
-        }
-        for (i, factor) in self.fields.iter().enumerate() {
-            if let Some(factor) = factor {
-                (by[0][(3 + i, 6 + i)], by[1][(3 + i, 6 + i)]) = (-factor, 1.0);
-            }
-        }
-        by
-    }
-}
-
 impl BeltProgram {
     /// The programme of a chain of pieces that nothing holds or loads.
     pub fn new(pieces: Vec<Piece>, model: EnergyModel) -> Self {
@@ -180,11 +144,14 @@ impl BeltProgram {
     /// clamps.
     pub fn cut_and_twisted(&self, angle: f64) -> Self {
         let mut cut = self.clone();
-        let start = cut.supports[0].hold.frame().unwrap_or_default();
-        if let (Some(end), Some(seam)) = (cut.supports.last_mut(), cut.links.last_mut()) {
-            let twist = UnitQuaternion::from_scaled_axis(angle * Vector3::y());
-            end.hold = Hold::Frame(start * twist);
-            seam.fields = [None; 2];
+        for link in &mut cut.links {
+            match &mut link.tie {
+                Tie::Offset(_) => (),
+                Tie::Pose(turn) => {
+                    *turn = UnitQuaternion::from_scaled_axis(angle * Vector3::y());
+                }
+                Tie::Fields(fields) => *fields = [None; 2],
+            }
         }
         cut
     }
@@ -349,7 +316,7 @@ impl BeltProgram {
             into[support.node] += support.jacobian(&point.poses[support.node]).tr_mul(rows);
         }
         for (link, rows) in self.links.iter().zip(between) {
-            for (node, by_node) in link.nodes.iter().zip(link.jacobian()) {
+            for (node, by_node) in link.nodes.iter().zip(link.jacobian(point)) {
                 into[*node] += by_node.tr_mul(rows);
             }
         }
@@ -648,7 +615,7 @@ impl BeltProgram {
             into.chain.nodes[i].hessian = support.hessian(pose, &multipliers[i]);
         }
         for (link, rows) in self.links.iter().zip(&mut into.links) {
-            *rows = link.jacobian();
+            *rows = link.jacobian(point);
         }
         for NodeLoad { node, load } in &self.loads {
             add_state(into, *node, &load.hessian(&point.poses[*node]));
@@ -775,11 +742,16 @@ mod tests {
             },
         ];
         let mut program = BeltProgram::new(pieces, EnergyModel::Wunderlich).with_supports(supports);
-        program.links = vec![NodeLink {
-            nodes: [1, 8],
-            offset: Vector3::new(0.1, 0.2, 0.3),
-            fields: [Some(-1.0), None],
-        }];
+        program.links = vec![
+            NodeLink {
+                nodes: [1, 8],
+                tie: Tie::Offset(Vector3::new(0.1, 0.2, 0.3)),
+            },
+            NodeLink {
+                nodes: [1, 8],
+                tie: Tie::Fields([Some(-1.0), None]),
+            },
+        ];
         program.loads = vec![NodeLoad {
             node: 4,
             load: DeadForce {
@@ -853,7 +825,7 @@ mod tests {
     fn test_gradient_and_hessian_agree_with_finite_differences() {
         let program = program();
         let at = point(&program);
-        let multipliers: Vec<Rows> = (0..4)
+        let multipliers: Vec<Rows> = (0..5)
             .map(|k| Rows::from_fn(|i, _| 0.7 + 0.6 * f64::from(k) - 0.4 * i as f64))
             .collect();
         let bounds: Bounds = (0..9).map(|k| [0.3 + 0.1 * f64::from(k), 0.5]).collect();

@@ -2,7 +2,7 @@
 
 use super::Units;
 use crate::belt::{Belt, Break};
-use crate::program::{BeltProgram, DeadForce, Hold, NodeLink, NodeLoad, NodeSupport};
+use crate::program::{BeltProgram, DeadForce, Hold, NodeLink, NodeLoad, NodeSupport, Tie};
 use crate::scenario::{Axis, Place, SAME_PLACE, Scenario, SupportSpec};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use std::f64::consts::PI;
@@ -29,7 +29,8 @@ impl<'a> Assembly<'a> {
 
     /// The programme on a mesh of about `count` elements.
     ///
-    /// Its supports are those of the scenario in their order, then what a closed belt needs; so are its links.
+    /// Its supports are those of the scenario in their order, or one at the start where there is none; its links are
+    /// those of the scenario, then the seam of a closed belt.
     pub(super) fn program(&self, count: usize) -> BeltProgram {
         let pieces = self.belt.pieces(count, &self.breaks());
         let bare = BeltProgram::new(pieces, self.scenario.energy);
@@ -45,9 +46,7 @@ impl<'a> Assembly<'a> {
         }
         let mut links = self.node_links(&places);
         if let Some(half_turns) = self.belt.half_turns {
-            let turn = PI * f64::from(half_turns);
-            supports.push(self.closed_end(&supports[0], places.last(), turn));
-            links.push(self.seam(&places));
+            links.extend(self.seam(half_turns, places.last()));
         }
         let mut program = bare.with_supports(supports);
         program.links = links;
@@ -102,8 +101,7 @@ impl<'a> Assembly<'a> {
         links
             .map(|link| NodeLink {
                 nodes: [node(&link.from), node(&link.to)],
-                offset: Vector3::from(link.offset) / length,
-                fields: [None; 2],
+                tie: Tie::Offset(Vector3::from(link.offset) / length),
             })
             .collect()
     }
@@ -127,29 +125,16 @@ impl<'a> Assembly<'a> {
         gravity * (self.belt.density * self.units.length / self.units.force())
     }
 
-    /// The frame in which a closed belt comes back to its start.
-    fn closed_end(&self, start: &NodeSupport, node: usize, turn: f64) -> NodeSupport {
-        let frame = start.hold.frame().unwrap_or_default();
-        let twist = UnitQuaternion::from_scaled_axis(turn * Vector3::y());
-        NodeSupport {
-            node,
-            position: [None; 3],
-            hold: Hold::Frame(frame * twist),
-            square_rib: false,
-        }
-    }
-
-    /// The place where a closed belt comes back to its start, and the fields with which it does.
-    fn seam(&self, places: &Places) -> NodeLink {
+    /// How the end of a closed belt joins its start.
+    fn seam(&self, half_turns: i32, last: usize) -> [NodeLink; 2] {
+        let turn = UnitQuaternion::from_scaled_axis(PI * f64::from(half_turns) * Vector3::y());
         let sign = self.belt.seam_sign();
-        NodeLink {
-            nodes: [0, places.last()],
-            offset: Vector3::zeros(),
-            fields: self
-                .belt
-                .goes_on_through_seam()
-                .map(|goes_on| goes_on.then_some(sign)),
-        }
+        let goes_on = self.belt.goes_on_through_seam();
+        let factors = goes_on.map(|goes_on| goes_on.then_some(sign));
+        [Tie::Pose(turn), Tie::Fields(factors)].map(|tie| NodeLink {
+            nodes: [0, last],
+            tie,
+        })
     }
 }
 

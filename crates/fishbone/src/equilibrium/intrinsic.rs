@@ -80,7 +80,7 @@ fn said_twice(scenario: &Scenario, program: &BeltProgram, bulge: &Vector3<f64>) 
         .iter()
         .any(|piece| matches!(piece, program::Piece::Rigid { .. }));
     let (supports, links) = (scenario.supports.len(), scenario.links.len());
-    if supports <= 2 && links == 0 && !rigid || scenario.belt.closed {
+    if supports <= 2 && links == 0 && !rigid {
         return None;
     }
     // In general position: some constraints depend on each other on the straight belt and nowhere else.
@@ -179,6 +179,8 @@ fn warnings(scenario: &Scenario, program: &BeltProgram, stable: Option<bool>) ->
     let longest = shares.fold(0.0, f64::max);
     let coarse = longest * SAFE > 1.0 + 1e-9;
     let taut = is_taut(scenario, scenario.belt.length());
+    let weightless = scenario.loads.gravity.is_some_and(|g| g != [0.0; 3])
+        && scenario.belt.density_value() == 0.0;
     let saddle = stable == Some(false);
     let turned = scenario
         .supports
@@ -194,6 +196,9 @@ fn warnings(scenario: &Scenario, program: &BeltProgram, stable: Option<bool>) ->
         }),
         taut.then(|| {
             "the supports leave the belt less than 1e-6 of slack: the reactions are not determined".to_owned()
+        }),
+        weightless.then(|| {
+            "gravity acts on no mass: give belt.density, or that of its material or layers".to_owned()
         }),
         saddle.then(|| "the equilibrium is no minimum of the energy: try another solver.bulge".to_owned()),
     ]
@@ -222,28 +227,18 @@ fn stable(status: Status, curvature: Curvature) -> Option<bool> {
     }
 }
 
-/// The supports' own forces; at the start of a closed belt with those that bring its end back.
 fn reactions(
     scenario: &Scenario,
     program: &BeltProgram,
     solution: &Solution<BeltPoint>,
     units: Units,
 ) -> Vec<Reaction> {
-    let mut wrenches: Vec<_> = program
-        .reactions(&solution.point, &solution.multipliers)
-        .into_iter()
-        .map(|wrench| units.wrench(wrench))
-        .collect();
-    if scenario.belt.closed
-        && let (Some(end), Some(start)) = (wrenches.pop(), wrenches.first_mut())
-    {
-        start.moment += end.moment;
-    }
+    let wrenches = program.reactions(&solution.point, &solution.multipliers);
     let supports = scenario.supports.iter().zip(wrenches);
     supports
         .map(|(support, wrench)| Reaction {
             at: support.at.arc_length(units.length),
-            wrench,
+            wrench: units.wrench(wrench),
         })
         .collect()
 }

@@ -50,13 +50,13 @@ pub struct NodeSupport {
 /// Like the rotation vector near zero, and zero at no other rotation. Unlike the rotation vector and the skew part of
 /// the matrix they have regular derivatives up to and at a half-turn, where the shorter of the two turns changes side.
 #[derive(Debug, Clone, Copy)]
-struct RotationGap {
+pub(super) struct RotationGap {
     scalar: f64,
     vector: Vector3<f64>,
 }
 
 impl RotationGap {
-    fn new(prescribed: &UnitQuaternion<f64>, frame: &Matrix3<f64>) -> Self {
+    pub(super) fn new(prescribed: &UnitQuaternion<f64>, frame: &Matrix3<f64>) -> Self {
         let now = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(*frame));
         let gap = prescribed.conjugate() * now;
         let sign = if gap.w < 0.0 { -1.0 } else { 1.0 };
@@ -66,11 +66,11 @@ impl RotationGap {
         }
     }
 
-    fn value(&self) -> Vector3<f64> {
+    pub(super) fn value(&self) -> Vector3<f64> {
         4.0 * self.vector / (1.0 + self.scalar)
     }
 
-    fn jacobian(&self) -> Matrix3<f64> {
+    pub(super) fn jacobian(&self) -> Matrix3<f64> {
         let denominator = 1.0 + self.scalar;
         let by_rotation = self.scalar * Matrix3::identity() + hat(&self.vector);
         2.0 / denominator * by_rotation

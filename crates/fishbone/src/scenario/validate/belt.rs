@@ -14,8 +14,8 @@ use std::ops::RangeInclusive;
 
 /// Ribs of a board bent more sharply than this at one point leave no room for each other.
 const SHARPEST: f64 = 2.0 * FRAC_PI_3;
-/// Decimals of an angle may exceed [`SHARPEST`] by this.
-const ANGLE_TOLERANCE: f64 = 1e-9;
+/// An angle of four decimals may exceed [`SHARPEST`] by this.
+const ANGLE_TOLERANCE: f64 = 1e-4;
 /// More full turns than this of a flat or an unloaded board ask for more elements than there may be.
 const MOST_TURNS: f64 = 1000.0;
 const HALF_TURNS: RangeInclusive<i32> = -20..=20;

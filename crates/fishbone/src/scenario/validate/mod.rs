@@ -35,7 +35,7 @@ impl Scenario {
         };
         check_supports(&self.supports, extent)?;
         check_links(&self.links, extent)?;
-        self.loads.check(extent, self.belt.density_value())?;
+        self.loads.check(extent)?;
         self.solver.check()?;
         self.check_elements()?;
         match self.solver.method {

@@ -50,10 +50,7 @@ pub(super) fn check_supports(supports: &[SupportSpec], extent: Extent) -> Check 
     for (i, pair) in supports.windows(2).enumerate() {
         check_order(i + 1, [&pair[0].at, &pair[1].at], extent.length)?;
     }
-    match supports.first() {
-        Some(first) if extent.closed => first.check_holds_start(extent.length),
-        _ => Ok(()),
-    }
+    Ok(())
 }
 
 pub(super) fn check_links(links: &[LinkSpec], extent: Extent) -> Check {
@@ -113,28 +110,6 @@ impl SupportSpec {
         self.quaternion
             .map_or(Ok(()), |quaternion| check_quaternion(i, quaternion))
     }
-
-    /// A closed belt is counted from its first support, which must tell where and how it lies there.
-    fn check_holds_start(&self, length: f64) -> Check {
-        let at = self.at.arc_length(length);
-        require(at == 0.0, format_args!("supports[0].at"), || {
-            (
-                number(at),
-                "\"start\", as the first support of a closed belt",
-            )
-        })?;
-        require(self.has_orientation(), format_args!("supports[0]"), || {
-            (
-                "a free orientation at the start of a closed belt",
-                format!("given {ORIENTATIONS}"),
-            )
-        })?;
-        require(
-            self.hinge.is_none(),
-            format_args!("supports[0].hinge"),
-            || ("a hinge at the start of a closed belt", "left out"),
-        )
-    }
 }
 
 impl LinkSpec {
@@ -159,16 +134,9 @@ impl LinkSpec {
 
 impl LoadsSpec {
     /// Mass per length decides whether gravity acts at all.
-    pub(super) fn check(&self, extent: Extent, density: f64) -> Check {
+    pub(super) fn check(&self, extent: Extent) -> Check {
         let gravity = self.gravity.unwrap_or_default();
         bounded_vector(format_args!("loads.gravity"), &gravity)?;
-        let acts = density > 0.0 || gravity == [0.0; 3];
-        require(acts, format_args!("loads.gravity"), || {
-            (
-                "gravity on a belt without mass",
-                "left out, or given with a density, a material's or layers' above 0",
-            )
-        })?;
         let field = format_args!("loads.points");
         at_most(field, self.points.len(), MOST_LOADS, "point loads")?;
         for (i, load) in self.points.iter().enumerate() {
