@@ -140,17 +140,17 @@ impl Curve {
         fractions.map(|fraction| self.point(fraction)).collect()
     }
 
-    /// Number of equal chords that keep to a tolerance: the sagitta of one is r (1 − cos(turn/2)).
+    /// Number of equal chords that keep to a tolerance: the sagitta of one is 2 r sin²(turn/4).
     fn chords(&self, tolerance: f64) -> usize {
         let Some((_, radius)) = self.circle() else {
             return 1;
         };
         let share = match tolerance > 0.0 {
-            true => (tolerance / radius).clamp(1e-9, 1.0),
+            true => (tolerance / radius).min(1.0),
             false => 1e-3,
         };
-        let widest = 2.0 * (1.0 - share).acos();
-        (self.turn().abs() / widest).ceil().max(1.0) as usize
+        let widest = 4.0 * (0.5 * share).sqrt().asin();
+        (self.turn().abs() / widest).ceil().clamp(1.0, 1e5) as usize
     }
 
     /// ½ ∫ (y dz − z dy): summed around a loop, its area.

@@ -95,7 +95,7 @@ fn roundness([a, b, c]: [Vector2<f64>; 3]) -> f64 {
 
 fn is_in_triangle(point: &Vector2<f64>, [a, b, c]: &[Vector2<f64>; 3]) -> bool {
     let area = (b - a).perp(&(c - a));
-    let is_left = |a: &Vector2<f64>, b: &Vector2<f64>| (b - a).perp(&(point - a)) >= -1e-12 * area;
+    let is_left = |a: &Vector2<f64>, b: &Vector2<f64>| (b - a).perp(&(point - a)) >= -1e-6 * area;
     is_left(a, b) && is_left(b, c) && is_left(c, a)
 }
 
