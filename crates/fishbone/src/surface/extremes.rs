@@ -321,6 +321,52 @@ mod tests {
         assert_eq!(rib_margin(&straight()).value, 20.0);
     }
 
+    /// A spine of one arc, length 0.4 and curvature 4, in 80 elements.
+    fn arc(bend: impl Fn(f64) -> f64, slope: impl Fn(f64) -> f64) -> Spine {
+        let u: Vec<f64> = (0..=80).map(|i| 0.4 * f64::from(i) / 80.0).collect();
+        let bend = u.iter().copied().map(bend).collect();
+        let slope = u.iter().copied().map(slope).collect();
+        let pieces = vec![Piece::Strip { geodesic: 4.0 }; 80];
+        Spine::from_fields(0.1, Pose::identity(), pieces, u, bend, slope)
+    }
+
+    #[test]
+    fn test_square_ribs_of_an_arc_bend_tightest_on_its_inner_edge() {
+        let least = least_bend_radius(&arc(|u| 2.0 + u, |_| 0.0)).unwrap();
+        assert_relative_eq!(least.value, (1.0 - 4.0 * 0.05) / 2.4, epsilon = 1e-14);
+        assert_relative_eq!(least.u, 0.4, epsilon = 1e-14);
+        assert_relative_eq!(least.v, 0.05, epsilon = 1e-14);
+        assert_relative_eq!(rib_margin(&arc(|_| 2.0, |_| 0.0)).value, 16.0);
+    }
+
+    #[test]
+    fn test_parallel_ribs_of_an_arc_bend_to_a_cylinder() {
+        let slope = |u: f64| (0.8 - 4.0 * u).tan();
+        let bent = arc(|u| 3.0 / (1.0 + slope(u).powi(2)), slope);
+        let least = least_bend_radius(&bent).unwrap();
+        // Slopes linear in each element leave the ribs parallel in its middle alone.
+        assert_relative_eq!(least.value, 1.0 / 3.0, max_relative = 1e-2);
+        assert!(rib_margin(&bent).value > 20.0 - 1e-2);
+    }
+
+    #[test]
+    fn test_stiffeners_and_joints_have_no_rib_margin() {
+        let pieces = vec![
+            Piece::Strip { geodesic: 0.0 },
+            Piece::Joint { angle: 0.7 },
+            Piece::Rigid,
+        ];
+        let (u, bend) = (vec![0.0, 0.5, 0.5, 1.0], vec![0.0; 4]);
+        let slope = vec![0.0, 0.7f64.tan(), 0.0, 30.0];
+        let spine = Spine::from_fields(0.1, Pose::identity(), pieces, u, bend, slope);
+        assert_relative_eq!(
+            rib_margin(&spine).value,
+            20.0 - 2.0 * 0.7f64.tan(),
+            epsilon = 1e-12
+        );
+        assert_eq!(least_bend_radius(&spine), None);
+    }
+
     fn straight() -> Spine {
         spine(1.0, 0.1, 4, |_| 1.0, |_| 0.3)
     }
