@@ -64,14 +64,18 @@ pub(crate) fn guess(program: &BeltProgram, bulge: &Vector3<f64>) -> BeltPoint {
     point
 }
 
-/// The start for a closed belt before it is twisted: a ring or, of a curved board, a cone, on the side of the bulge.
+/// The start for a closed belt before it is twisted: a ring or, of a curved board, a cone; to the side to which the belt
+/// curls of itself, else to that of the bulge.
 pub(crate) fn ring(program: &BeltProgram, bulge: &Vector3<f64>) -> BeltPoint {
     let start = program.supports.first();
     let frame = start_frame(program, start, None, bulge);
-    let side = if frame.column(0).dot(bulge) < 0.0 {
-        1.0
-    } else {
-        -1.0
+    let curl: f64 = program
+        .elements()
+        .map(|(_, element)| element.length * element.curl.bend)
+        .sum();
+    let side = match curl == 0.0 {
+        true => -frame.column(0).dot(bulge).signum(),
+        false => curl.signum(),
     };
     let bend = side * (TAU * TAU - total_turn(program).powi(2)).max(0.0).sqrt();
     let slopes = calm_slopes(program).into_iter();
