@@ -1,7 +1,7 @@
 """Every field of a scenario: one that is good and solves, one that is bad and is refused by name.
 
-CONTRACT, "Scenario file". A field that is read and has no effect is as wrong as one that is not read: the last tests say
-what some of them must do.
+CONTRACT, "Scenario file". A field that is read and has no effect is as wrong as one that is not read: the last
+tests say what some of them must do.
 """
 
 from __future__ import annotations
