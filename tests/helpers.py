@@ -24,6 +24,7 @@ from scipy.special import ellipe, ellipj, ellipk, elliprd, elliprf
 import fishbone as fb
 
 Array = npt.NDArray[np.float64]
+Nodes = npt.NDArray[np.intp]
 Json = dict[str, Any]
 Energy = Literal["fishbone", "sadowsky", "wunderlich"]
 
@@ -490,12 +491,12 @@ def node_at(equilibrium: fb.Equilibrium, u: float) -> int:
     return int(nodes[-1])
 
 
-def joints(equilibrium: fb.Equilibrium) -> Array:
+def joints(equilibrium: fb.Equilibrium) -> Nodes:
     """Nodes k whose next node is at the same place: the belt before and after a joint."""
     return np.flatnonzero(np.diff(equilibrium.u) < SAME_PLACE)
 
 
-def elements_of(equilibrium: fb.Equilibrium) -> Array:
+def elements_of(equilibrium: fb.Equilibrium) -> Nodes:
     """First nodes of the elements, joints left out."""
     return np.flatnonzero(np.diff(equilibrium.u) >= SAME_PLACE)
 
@@ -684,7 +685,7 @@ class Cantilever:
 
     @property
     def tip(self) -> Array:
-        return self.position(self.length)[0]
+        return np.asarray(self.position(self.length)[0], dtype=np.float64)
 
     @property
     def elastic_energy(self) -> float:

@@ -128,7 +128,7 @@ def largest(equilibrium: fb.Equilibrium, scenario: Json) -> float:
 
 def in_units_of(wrenches: Array, scenario: Json) -> Array:
     """Forces times the length, so that all six numbers are moments."""
-    return wrenches * np.repeat([total_length(scenario), 1.0], 3)
+    return np.asarray(wrenches * np.repeat([total_length(scenario), 1.0], 3), dtype=np.float64)
 
 
 def assert_in_balance(equilibrium: fb.Equilibrium, scenario: Json) -> None:

@@ -48,7 +48,7 @@ def closed(
     elements: int = ELEMENTS,
     **fields: Any,
 ) -> Json:
-    turns = {} if half_turns is None else {"half_turns": half_turns}
+    turns: Json = {} if half_turns is None else {"half_turns": half_turns}
     return board(
         [straight(LENGTH)],
         supports or [],

@@ -17,6 +17,7 @@ from helpers import (
     Cantilever,
     Energy,
     Json,
+    Nodes,
     arc,
     board,
     corner,
@@ -69,7 +70,7 @@ def stiffened(energy: Energy = "wunderlich", middle: Json | None = None, **optio
     return held([straight(0.4), middle or rigid(0.1), straight(0.5)], energy=energy, elements=80, **options)
 
 
-def between(equilibrium: fb.Equilibrium, low: float, high: float) -> Array:
+def between(equilibrium: fb.Equilibrium, low: float, high: float) -> Nodes:
     """Nodes of a segment, the joints' own side included: elements decide, not places."""
     first = elements_of(equilibrium)
     middle = 0.5 * (equilibrium.u[first] + equilibrium.u[first + 1])
@@ -295,7 +296,7 @@ def test_stiffener_is_the_limit_of_a_stiff_strip(energy: Energy) -> None:
 def test_stiffener_takes_the_weight_but_not_the_bend() -> None:
     """A heavy cantilever that is rigid all but for its first half."""
     clamp = [support("start", ORIGIN, ORIGIN)]
-    heavy = {"elements": 160, "density": 4.0, "gravity": (-1.0, 0.0, 0.0)}
+    heavy: Json = {"elements": 160, "density": 4.0, "gravity": (-1.0, 0.0, 0.0)}
     hanging = solve(board([straight(0.5), rigid(0.5)], clamp, **heavy))
     force, _ = hanging.reaction("start")
     assert force == pytest.approx([4.0, 0.0, 0.0], abs=1e-6)
