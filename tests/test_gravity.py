@@ -249,6 +249,16 @@ def test_flat_ribbon_above_the_threshold_is_not_called_stable() -> None:
     assert abs(float(equilibrium.position[-1, 0])) > 0.1 or equilibrium.stable is not True
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_ribbon_falls_to_the_side_of_the_bulge(side: float) -> None:
+    """CONTRACT: `bulge` says which of mirror twins to take; x → −x is one, and nothing else tells them apart."""
+    scenario = on_edge(25.0, "sadowsky", 0.02, square_rib=False, push=0.0)
+    scenario["solver"]["bulge"] = [side, 0.0, 0.0]
+    equilibrium = solve(scenario)
+    tip = float(equilibrium.position[-1, 0])
+    assert abs(tip) < 1e-4 or tip * side > 0.0
+
+
 def test_rib_at_the_clamp_leans_by_45_degrees_as_a_narrow_ribbon_buckles() -> None:
     """MODEL §6: rib slope 1.00; its sign says to which side the belt falls."""
     for weight in (22.0, 25.0):
