@@ -272,11 +272,17 @@ pub(crate) fn disturb(program: &BeltProgram, point: &BeltPoint, share: f64) -> B
     inside(program, disturbed)
 }
 
-/// A flat belt bent to the side, with ribs all sloping one way: what a load in its plane may buckle it into.
+/// A flat belt bent to the side of the bulge, with ribs all sloping one way: what a load in its plane may buckle it into.
 ///
 /// In the flat state every slope of the ribs is as good as any other, so that small disturbances do not tell.
-pub(crate) fn buckle(program: &BeltProgram, point: &BeltPoint, slope: f64) -> BeltPoint {
+pub(crate) fn buckle(
+    program: &BeltProgram,
+    point: &BeltPoint,
+    slope: f64,
+    bulge: &Vector3<f64>,
+) -> BeltPoint {
     const BEND: f64 = 1.0;
+    let side = -point.poses[0].frame.column(0).dot(bulge).signum();
     let mut buckled = point.clone();
     let calm = calm_slopes(program);
     let nodes = program.nodes();
@@ -291,7 +297,7 @@ pub(crate) fn buckle(program: &BeltProgram, point: &BeltPoint, slope: f64) -> Be
     for ((fields, calm), u) in buckled.fields.iter_mut().zip(calm).zip(&nodes) {
         let free = held.iter().map(|held| (held - u).abs());
         let most = free.fold(f64::INFINITY, f64::min) * steepest;
-        *fields = Vector2::new(BEND * (1.0 - u), calm + slope.clamp(-most, most));
+        *fields = Vector2::new(side * BEND * (1.0 - u), calm + slope.clamp(-most, most));
     }
     inside(program, buckled)
 }

@@ -90,7 +90,7 @@ impl<'a> Assembly<'a> {
             node: places.node(support.at.arc_length(length) / length),
             position: [0, 1, 2].map(|i| Some((support.components()[i]? - self.origin[i]) / length)),
             hold: hold(support),
-            square_rib: support.is_square_rib(length),
+            square_rib: self.scenario.is_square_rib(support),
         }
     }
 

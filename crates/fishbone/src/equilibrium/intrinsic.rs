@@ -14,6 +14,10 @@ use crate::spine::{Piece, Spine};
 use nalgebra::Vector3;
 use std::ops::ControlFlow;
 
+/// Why a search does not begin.
+const CROSSING: &str = "no ribs found that do not cross: the bends, arcs and square ribs of the board are too close together \
+                        for its width; make it narrower or the segments longer";
+
 /// Finds a minimum of the energy in the two fields.
 pub(super) fn solve(
     scenario: &Scenario,
@@ -34,9 +38,11 @@ pub(super) fn solve(
         Some(_) => search.start(&program),
         None => search.run(&program, coarse.as_ref(), proceed),
     };
+    let crossing = program.least_slack(&solution.point) <= 0.0;
     let said_twice = said_twice(scenario, &program, &search.bulge);
     let (status, message) = match excess {
         Some(message) => (Status::Infeasible, message),
+        None if crossing => (Status::NotConverged, CROSSING.to_owned()),
         None => judge(&solution, search.tolerance, said_twice.as_deref()),
     };
     let stable = stable(status, solution.curvature);

@@ -83,7 +83,7 @@ impl Search {
         for slope in [SLANT, -SLANT] {
             if is_flat_under_load(program, &best) {
                 best = better(best, |best| {
-                    let buckled = buckle(program, &best.point, slope);
+                    let buckled = buckle(program, &best.point, slope, &self.bulge);
                     self.minimise(program, buckled, WARM, proceed)
                 });
             }

@@ -390,6 +390,12 @@ impl Scenario {
             .unwrap_or_else(|| self.default_elements())
     }
 
+    /// Whether the rib at a support is square: as the support says, else at a clamped end; a closed belt has no ends.
+    pub fn is_square_rib(&self, support: &SupportSpec) -> bool {
+        let clamped_end = !self.belt.closed && support.is_square_rib(self.belt.length());
+        support.square_rib.unwrap_or(clamped_end)
+    }
+
     /// Number of elements where the scenario names none.
     pub fn default_elements(&self) -> usize {
         default_elements(self.belt.length(), self.belt.width)
