@@ -12,6 +12,7 @@ from fishbone import _core
 from fishbone.errors import InvalidArgument, NoSupport, NotConverged
 
 if TYPE_CHECKING:
+    import numpy.typing as npt
     from numpy.typing import NDArray
 
     from fishbone.scenario import Scenario
@@ -53,6 +54,20 @@ class Edges(NamedTuple):
 
     minus: Floats
     plus: Floats
+
+
+class Outline(NamedTuple):
+    """The outline of the flat board as polylines, flat coordinates (y, z): along η and ζ of the start.
+
+    Shapes: (m, 2) each.
+    """
+
+    minus: Floats
+    """The edge on the −ζ side, from the start of the belt to its end."""
+    plus: Floats
+    """The edge on the +ζ side, from the start of the belt to its end."""
+    loops: list[Floats]
+    """What to draw: one closed, counter-clockwise loop of an open belt; the two edges of a closed one."""
 
 
 class Residuals(NamedTuple):
@@ -310,6 +325,62 @@ class Equilibrium:
         """
         return self._inner.mesh(_across(n_across))
 
+    def outline(self, tolerance: float | None = None) -> Outline:
+        """The outline of the flat board, exact but for its arcs: no chord is farther from one than `tolerance`.
+
+        The default is a thousandth of the width. A closed belt is cut open at its start.
+
+        Errors: `InvalidArgument` where the tolerance is not positive.
+        """
+        if tolerance is None:
+            tolerance = 1e-3 * float(self.scenario.to_dict()["belt"]["width"])
+        if not 0.0 < tolerance < math.inf:
+            raise InvalidArgument(f"tolerance: found {tolerance}, allowed a positive finite number")
+        return Outline(*self._inner.outline(tolerance))
+
+    def flat_spine(self) -> Floats:
+        """The nodes' places in the flat board, coordinates (y, z).
+
+        Shapes: (n, 2).
+        """
+        return self._inner.flat_spine()
+
+    def flat_ribs(self) -> Floats:
+        """The ends of the nodes' ribs in the flat board, on the −ζ side and on the +ζ side, coordinates (y, z).
+
+        Shapes: (n, 2, 2).
+        """
+        return self._inner.flat_ribs()
+
+    def flat_mesh(self, n_across: int = 9) -> tuple[Floats, NDArray[np.int64]]:
+        """Vertices (y, z) and triangles of the flat board, which `mesh` has bent: triangle by triangle the same.
+
+        Shapes: (p, 2) and (m, 3). A closed belt has the vertices of its seam once more, where the flat board ends.
+        Errors: `InvalidArgument` where n_across is below 2.
+        """
+        return self._inner.flat_mesh(_across(n_across))
+
+    def material_points(self, flat: npt.ArrayLike) -> Floats:
+        """Where points (y, z) of the flat board are on the bent one; NaN where they are off the board.
+
+        Shapes: (m, 2) to (m, 3).
+        Errors: `InvalidArgument` for another shape.
+        """
+        return self._inner.material_points(_flat_points(flat))
+
+    def rib_feet(self, flat: npt.ArrayLike) -> Floats:
+        """Arc length u of the ribs through points (y, z) of the flat board; NaN where they are off the board.
+
+        Shapes: (m, 2) to (m,).
+        Errors: `InvalidArgument` for another shape.
+        """
+        return self._inner.rib_feet(_flat_points(flat))
+
+    @property
+    def stiffeners(self) -> list[tuple[float, float]]:
+        """From where to where along the spine the board is rigid; in pieces where supports or loads lie in between."""
+        return self._inner.stiffeners
+
     def to_dict(self) -> dict[str, Any]:
         """The result as plain numbers, lists and text, schema "fishbone.result/1"."""
         result: dict[str, Any] = json.loads(self._inner.to_json())
@@ -340,3 +411,11 @@ def _across(n_across: int) -> int:
     if not MIN_ACROSS <= n_across <= MAX_ACROSS:
         raise InvalidArgument(f"n_across: found {n_across}, allowed {MIN_ACROSS} to {MAX_ACROSS}")
     return n_across
+
+
+def _flat_points(flat: npt.ArrayLike) -> list[list[float]]:
+    points = np.asarray(flat, dtype=np.float64)
+    if points.ndim != 2 or points.shape[1] != 2:  # noqa: PLR2004 - (y, z)
+        raise InvalidArgument(f"flat: found an array of shape {points.shape}, allowed (m, 2)")
+    rows: list[list[float]] = points.tolist()
+    return rows

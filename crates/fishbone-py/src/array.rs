@@ -1,6 +1,6 @@
 //! From the core's vectors to NumPy arrays: float64, C order, one row a node.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Vector2, Vector3};
 use numpy::ndarray::{Array2, Array3};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3};
 use pyo3::exceptions::PyRuntimeError;
@@ -23,6 +23,20 @@ pub(crate) fn points<'a, 'py>(
 ) -> Points<'py> {
     let rows: Vec<[f64; 3]> = vectors.into_iter().map(row).collect();
     Array2::from(rows).into_pyarray(py)
+}
+
+/// Shapes: (n, 2).
+pub(crate) fn flat_points(
+    py: Python<'_>,
+    vectors: impl IntoIterator<Item = Vector2<f64>>,
+) -> Points<'_> {
+    let rows: Vec<[f64; 2]> = vectors.into_iter().map(Into::into).collect();
+    Array2::from(rows).into_pyarray(py)
+}
+
+/// Shapes: (n, 2, 2).
+pub(crate) fn pairs(py: Python<'_>, rows: Vec<[[f64; 2]; 2]>) -> Grid<'_> {
+    Array3::from(rows).into_pyarray(py)
 }
 
 /// Shapes: (n, 3, 3), row-major.

@@ -3,7 +3,9 @@
 use crate::array::{self, Grid, Points, Scalars, Triangles};
 use crate::scenario::Scenario;
 use fishbone::equilibrium::{self, Status, Wrench};
-use fishbone::surface;
+use fishbone::spine::Piece;
+use fishbone::surface::{self, Curve, Rib};
+use nalgebra::{Vector2, Vector3};
 use numpy::IntoPyArray;
 use pyo3::prelude::*;
 use std::ops::ControlFlow;
@@ -259,8 +261,97 @@ impl Equilibrium {
         )
     }
 
+    /// (minus, plus, loops), polylines of the flat board's outline.
+    ///
+    /// Shapes: (m, 2) each.
+    fn outline<'py>(
+        &self,
+        py: Python<'py>,
+        tolerance: f64,
+    ) -> (Points<'py>, Points<'py>, Vec<Points<'py>>) {
+        let outline = surface::outline(&self.solved.spine);
+        let [minus, plus] = [&outline.minus, &outline.plus]
+            .map(|edge| array::flat_points(py, polyline(edge, tolerance)));
+        let loops = outline.lines(tolerance).into_iter();
+        let loops = loops.map(|line| array::flat_points(py, line));
+        (minus, plus, loops.collect())
+    }
+
+    /// The spine of the flat board at every node.
+    ///
+    /// Shapes: (n, 2).
+    fn flat_spine<'py>(&self, py: Python<'py>) -> Points<'py> {
+        let ribs = surface::ribs(&self.solved.spine);
+        array::flat_points(py, ribs.iter().map(|rib| rib.flat.position))
+    }
+
+    /// The ends of the flat board's ribs on the −ζ and the +ζ side.
+    ///
+    /// Shapes: (n, 2, 2).
+    fn flat_ribs<'py>(&self, py: Python<'py>) -> Grid<'py> {
+        let ribs = surface::ribs(&self.solved.spine);
+        let ends = |rib: &Rib| [rib.v_minus, rib.v_plus].map(|v| rib.flat_point(v).into());
+        array::pairs(py, ribs.iter().map(ends).collect())
+    }
+
+    /// (vertices, triangles) of the mesh in the flat board.
+    ///
+    /// Shapes: (p, 2), (m, 3).
+    fn flat_mesh<'py>(&self, py: Python<'py>, n_across: usize) -> (Points<'py>, Triangles<'py>) {
+        let mesh = surface::mesh(&self.solved.spine, n_across);
+        (
+            array::flat_points(py, mesh.flat),
+            array::triangles(py, &mesh.flat_triangles),
+        )
+    }
+
+    /// The surface's points that were these points of the flat board; NaN off the board.
+    ///
+    /// Shapes: (m, 2) to (m, 3).
+    fn material_points<'py>(&self, py: Python<'py>, flat: Vec<[f64; 2]>) -> Points<'py> {
+        let off_board = Vector3::repeat(f64::NAN);
+        let point = |[y, z]: [f64; 2]| surface::material_point(&self.solved.spine, y, z);
+        let points: Vec<_> = flat
+            .into_iter()
+            .map(|at| point(at).unwrap_or(off_board))
+            .collect();
+        array::points(py, &points)
+    }
+
+    /// Arc lengths of the feet of the ribs through points of the flat board; NaN off the board.
+    ///
+    /// Shapes: (m, 2) to (m,).
+    fn rib_feet<'py>(&self, py: Python<'py>, flat: Vec<[f64; 2]>) -> Scalars<'py> {
+        let foot = |[y, z]: [f64; 2]| surface::rib_foot(&self.solved.spine, y, z);
+        let feet: Vec<_> = flat
+            .into_iter()
+            .map(|at| foot(at).unwrap_or(f64::NAN))
+            .collect();
+        feet.into_pyarray(py)
+    }
+
+    /// From where to where along the spine each stiffened stretch goes.
+    #[getter]
+    fn stiffeners(&self) -> Vec<(f64, f64)> {
+        let spine = &self.solved.spine;
+        let pieces = spine.pieces.iter().enumerate();
+        pieces
+            .filter(|(_, piece)| matches!(piece, Piece::Rigid))
+            .map(|(element, _)| (spine.u[element], spine.u[element + 1]))
+            .collect()
+    }
+
     /// The result schema as JSON, without `solve_time`.
     fn to_json(&self) -> String {
         self.solved.to_json()
     }
+}
+
+/// Points along an edge, no chord farther from it than a tolerance.
+fn polyline(edge: &[Curve], tolerance: f64) -> Vec<Vector2<f64>> {
+    let first = edge.first().map(Curve::first);
+    let others = edge
+        .iter()
+        .flat_map(|curve| curve.points(tolerance).into_iter().skip(1));
+    first.into_iter().chain(others).collect()
 }
