@@ -8,7 +8,7 @@ import pytest
 import trimesh
 
 import fishbone as fb
-from fishbone import export, plot
+from fishbone import examples, export, plot
 
 
 def test_the_views_have_one_scale(equilibrium):
@@ -96,3 +96,94 @@ def test_a_missing_package_says_how_to_get_it(monkeypatch, module, package, extr
     with pytest.raises(fb.MissingPackage) as refusal:
         __import__(f"fishbone.{module}")
     assert f'pip install "fishbone[{extra}]"' in str(refusal.value)
+
+
+def everything(example):
+    """A board with something of all that a picture marks."""
+    return fb.Scenario.from_dict(
+        {
+            "belt": {
+                "width": 0.1,
+                "rigidity": 1.0,
+                "density": 1.0,
+                "segments": [
+                    {"kind": "rigid", "length": 0.1},
+                    {"kind": "straight", "length": 0.3},
+                    {"kind": "corner", "angle": 0.5},
+                    {"kind": "arc", "length": 0.6, "curvature": -1.0},
+                ],
+            },
+            "supports": [
+                {"at": "start", "position": [0.0, 0.0, 0.0], "rotation": [0.0, 0.0, 0.0]},
+                {"at": 0.5, "position": ["free", 0.45, "free"]},
+                {"at": "end", "position": [0.0, 0.8, 0.0], "rotation": [0.0, 0.0, 0.0], "hinge": "zeta"},
+            ],
+            "links": [{"from": 0.3, "to": 0.7, "offset": [0.0, 0.35, 0.0]}],
+            "loads": {
+                "gravity": [-1.0, 0.0, 0.0],
+                "points": [{"at": 0.6, "force": [0.0, 0.0, 1.0], "lever": [0.0, 0.0, 0.04]}],
+            },
+            "energy": example.to_dict()["energy"],
+        }
+    )
+
+
+def labels(figure):
+    return {text.get_text() for part in figure.subfigs for legend in part.legends for text in legend.get_texts()}
+
+
+def test_the_key_names_what_the_picture_has_and_nothing_else(equilibrium, example):
+    always = {"spine", "edges", "ribs", "+ξ side", "−ξ side", "start, u = 0", "highest point"}
+    assert labels(plot.views(equilibrium)) == always | {"held frame"}
+    marks = {"rigid", "held frame", "held place", "hinge axis", "link", "force", "gravity"}
+    assert labels(plot.views(fb.solve(everything(example)))) == always | marks
+
+
+def test_arrows_of_forces_lie_within_the_views(example):
+    equilibrium = fb.solve(everything(example))
+    scene = plot._Scene(equilibrium)
+    assert len(scene.arrows) == 1
+    for arrow in scene.arrows:
+        for point in (arrow.at, arrow.at + arrow.reach):
+            assert (scene.low < point).all()
+            assert (point < scene.high).all()
+
+
+@pytest.mark.parametrize("name", examples.names())
+def test_every_shipped_scenario_is_drawn(name, tmp_path):
+    path = tmp_path / f"{name}.toml"
+    path.write_text(examples.text(name), "utf-8")
+    equilibrium = fb.solve(fb.load(path))
+    plot.save(equilibrium, tmp_path / "views.pdf")
+    export.save(equilibrium, tmp_path / "belt.stl")
+
+
+def test_strips_hold_every_triangle_once_and_the_whole_spine(example):
+    equilibrium = fb.solve(everything(example))
+    strips = list(plot._strips(equilibrium))
+    _, triangles = equilibrium.mesh(2)
+    assert sum(len(strip.faces) for strip in strips) == len(triangles)
+    rigid = [strip for strip in strips if strip.rigid]
+    assert len(rigid) == 1
+    edges = sum(
+        np.linalg.norm(line[1] - line[0]) for strip in strips for line, style in strip.lines if style is plot._EDGE
+    )
+    outline = equilibrium.outline().loops[0]
+    assert edges == pytest.approx(np.linalg.norm(np.diff(outline, axis=0), axis=1).sum(), rel=1e-3)
+
+
+def test_the_flat_board_is_drawn_to_scale(equilibrium):
+    figure = plot.flat(equilibrium)
+    figure.draw_without_rendering()
+    (axes,) = figure.axes
+    assert axes.get_aspect() == 1.0
+    low, high = (np.array(limits) for limits in zip(axes.get_xlim(), axes.get_ylim(), strict=True))
+    for line in equilibrium.outline().loops:
+        assert (low <= line.min(axis=0)).all()
+        assert (line.max(axis=0) <= high).all()
+
+
+def test_a_view_along_the_upward_axis_is_refused(equilibrium):
+    plot.oblique(equilibrium, (1.0, 1.0, 1.0))
+    with pytest.raises(fb.InvalidArgument, match="viewer"):
+        plot.oblique(equilibrium, (1.0, 0.0, 0.0))

@@ -224,6 +224,7 @@ def _draw_graph(axes: Axes, equilibrium: Equilibrium, values: Floats, title: str
     axes.axhline(0.0, color="0.6", linewidth=0.5)
     axes.plot(u, values, color="black", linewidth=1.0)
     axes.set(xlim=(u[0], u[-1]), xlabel="u [length]", ylabel=label, title=title)
+    axes.xaxis.set_major_locator(MaxNLocator(6))
     axes.grid(visible=True, color="0.9", linewidth=0.5)
 
 
@@ -250,7 +251,7 @@ def _key(equilibrium: Equilibrium) -> Iterator[Line2D | Patch]:
             yield Line2D([], [], label=label, **style)
     if tables.get("links"):
         yield Line2D([], [], label="link", **_LINK)
-    arrow = {"linestyle": "", "marker": "$→$", "markersize": 9.0}
+    arrow: Style = {"linestyle": "", "marker": "$→$", "markersize": 9.0}
     if loads.get("points"):
         yield Line2D([], [], label="force", color=_ARROW["color"], **arrow)
     if _gravity(tables).any():
@@ -276,6 +277,9 @@ def draw_flat(axes: Axes, equilibrium: Equilibrium) -> None:
     axes.plot(*spine[0], zorder=3, **_START)
     axes.set(aspect="equal", title="Flat board", xlabel="y [length]", ylabel="z [length]")
     axes.autoscale_view()
+    # A narrow board has little room for numbers.
+    axes.xaxis.set_major_locator(MaxNLocator(6 if np.ptp(axes.get_xlim()) > np.ptp(axes.get_ylim()) else 4))
+    axes.yaxis.set_major_locator(MaxNLocator(3 if np.ptp(axes.get_ylim()) < 0.3 * np.ptp(axes.get_xlim()) else 6))
 
 
 def _flat_height(equilibrium: Equilibrium) -> float:
@@ -310,7 +314,7 @@ def _draw_oblique(axes: Axes, scene: _Scene, viewer: ArrayLike) -> None:
     toward = np.asarray(viewer, dtype=np.float64) / np.linalg.norm(viewer)
     right = np.cross(_UNIT[_X], toward)
     if not np.any(right):
-        raise InvalidArgument(f"viewer: found {viewer}, allowed a direction that is not along x")
+        raise InvalidArgument(f"viewer: found {toward.tolist()}, allowed a direction that is not along x")
     right /= np.linalg.norm(right)
     view = _View("", right, np.cross(toward, right), toward)
     _draw_scene(axes, scene, view, lit=True)
@@ -327,7 +331,7 @@ def _draw_triad(axes: Axes, scene: _Scene, view: _View) -> None:
     origin = points.min(axis=0) - np.minimum(tips.min(axis=0), 0.0) - 0.06 * np.ptp(points, axis=0).max()
     for name, tip in zip(_AXES, tips, strict=True):
         _draw_arrow(axes, origin, tip, {"arrowstyle": "-|>", "color": "0.3", "linewidth": 0.7}, length)
-        axes.annotate(name, origin + 1.35 * tip, color="0.2", ha="center", va="center", fontstyle="italic")
+        axes.annotate(name, _xy(origin + 1.35 * tip), color="0.2", ha="center", va="center", fontstyle="italic")
     # Annotations alone do not widen the axes.
     axes.plot(*(origin + 1.5 * tips).T, linestyle="")
     axes.plot(*points.T, linestyle="")
@@ -427,7 +431,9 @@ def _strips(equilibrium: Equilibrium) -> Iterator[_Strip]:
         lines = [(ribs[node], _RIB) for node in (element, element + 1) if node in drawn]
         lines += [(vertices[edge], _EDGE) for edge in edges]
         lines.append((equilibrium.position[element : element + 2], _SPINE))
-        yield _Strip(vertices[triangles[own]], bool(rigid[own].any()), lines, vertices[triangles[own]].mean(axis=(0, 1)))
+        yield _Strip(
+            vertices[triangles[own]], bool(rigid[own].any()), lines, vertices[triangles[own]].mean(axis=(0, 1))
+        )
 
 
 def _drawn_ribs(u: Floats) -> list[int]:
@@ -498,9 +504,13 @@ def _draw_gravity(axes: Axes, scene: _Scene, view: _View) -> None:
         points = view.page(scene.points)
         high, room = points.max(axis=0), np.ptp(points, axis=0)
     reach *= min(1.0, 0.6 * float(room.min()) / max(float(np.linalg.norm(reach)), np.finfo(float).tiny))
+    if np.linalg.norm(reach) < _HIDDEN_SHARE * scene.size:
+        return  # along the line of sight: the other views show it
     at = high - 0.08 * room - np.maximum(reach, 0.0)
     _draw_arrow(axes, at, reach, _GRAVITY, scene.size)
-    axes.annotate("g", at + 0.5 * reach, xytext=(-8, 0), textcoords="offset points", color="0.3", fontstyle="italic")
+    axes.annotate(
+        "g", _xy(at + 0.5 * reach), xytext=(-8, 0), textcoords="offset points", color="0.3", fontstyle="italic"
+    )
 
 
 def _draw_arrow(axes: Axes, at: Floats, reach: Floats, style: Style, size: float) -> None:
@@ -508,4 +518,8 @@ def _draw_arrow(axes: Axes, at: Floats, reach: Floats, style: Style, size: float
     if np.linalg.norm(reach) < _HIDDEN_SHARE * size:
         axes.plot(*at, zorder=5, color=style["color"], marker="o", markersize=6.0, fillstyle="none", linestyle="")
         return
-    axes.annotate("", at + reach, at, arrowprops=style, zorder=5)
+    axes.annotate("", _xy(at + reach), _xy(at), arrowprops=style, zorder=5)
+
+
+def _xy(point: Floats) -> tuple[float, float]:
+    return float(point[0]), float(point[1])

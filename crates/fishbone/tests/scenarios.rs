@@ -86,6 +86,77 @@ fn test_planar_and_twisted_belts_converge_to_minima() {
     assert!(twisted.spine.twist() > 1.0);
 }
 
+/// What a scenario has come to on ever finer meshes: energy, to a thousandth, and highest point in U.
+struct Golden {
+    text: &'static str,
+    energy: f64,
+    highest: [f64; 3],
+    /// `None` where a free end makes the second variation too small to tell.
+    stable: Option<bool>,
+}
+
+#[test]
+fn test_boards_loads_curls_and_closed_belts_are_those_of_finer_meshes() {
+    let golden = [
+        Golden {
+            text: include_str!("../../../scenarios/bent.toml"),
+            energy: 11.536,
+            highest: [0.2955, 0.3708, -0.0224],
+            stable: Some(true),
+        },
+        Golden {
+            text: include_str!("../../../scenarios/curved.toml"),
+            energy: 12.867,
+            highest: [0.3077, 0.3062, 0.1438],
+            stable: Some(true),
+        },
+        Golden {
+            text: include_str!("../../../scenarios/hinge.toml"),
+            energy: 1.4838e-4,
+            highest: [-0.0205, 0.2553, 0.3286],
+            stable: Some(true),
+        },
+        Golden {
+            text: include_str!("../../../scenarios/cantilever.toml"),
+            energy: -4.722e-5,
+            highest: [0.0307, 0.0994, 0.0198],
+            stable: None,
+        },
+        Golden {
+            text: include_str!("../../../scenarios/curl.toml"),
+            energy: -7.289,
+            highest: [-0.3168, -0.0213, 0.2170],
+            stable: Some(true),
+        },
+    ];
+    for case in golden {
+        let equilibrium = solved(case.text);
+        let message = &equilibrium.message;
+        assert_eq!(equilibrium.status, Status::Converged, "{message}");
+        assert_eq!(equilibrium.stable, case.stable, "{message}");
+        assert!(equilibrium.warnings.is_empty());
+        assert!(equilibrium.residuals.largest() <= 1e-8);
+        assert_near(equilibrium.energy, case.energy, 1e-3 * case.energy.abs());
+        let highest = equilibrium.highest_point().position / equilibrium.spine.length();
+        for (value, expected) in highest.iter().zip(case.highest) {
+            assert_near(*value, expected, 1e-3);
+        }
+    }
+}
+
+#[test]
+fn test_moebius_band_has_the_published_energy() {
+    let equilibrium = solved(include_str!("../../../scenarios/mobius.toml"));
+    assert_eq!(equilibrium.status, Status::Converged);
+    assert_eq!(equilibrium.stable, Some(true));
+    // Starostin & van der Heijden: 18.63 half-widths.
+    assert_near(
+        equilibrium.energy * 30.0 / std::f64::consts::PI,
+        18.63,
+        0.01,
+    );
+}
+
 #[test]
 fn test_solves_are_identical_bit_by_bit() {
     let text = include_str!("../../../scenarios/example2.toml");
