@@ -13,14 +13,16 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
+import fishbone as fb
 import ritz
 from cases import ENERGIES, EXAMPLES, SHEET, distance_to_shell, example, gentle_arc, refine, shell, solve
+from fishbone import plot
+from fishbone.plot import VIEWER
+from tables import ROOT
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
-
-    import fishbone as fb
 
     Floats = NDArray[np.float64]
 
@@ -44,6 +46,21 @@ LINES: dict[str, dict[str, Any]] = {
 }
 OPEN = {"color": "0.55", "linestyle": "-.", "marker": "v", "markersize": 5.0, "markerfacecolor": "white"}
 GENTLE = {"color": "0.55", "marker": "D", "markersize": 4.0}
+GALLERY = {
+    "bent": (0.5, -0.75, 0.4),
+    "cantilever": (0.3, 0.45, -0.8),
+    "curl": (0.3, 0.75, 0.35),
+    "curved": (0.5, -0.75, 0.4),
+    "example1": VIEWER,
+    "example2": VIEWER,
+    "hinge": (0.4, -0.5, -0.7),
+    "mobius": (0.75, 0.45, -0.5),
+    "planar": VIEWER,
+    "polystyrene": VIEWER,
+    "twist": VIEWER,
+}
+"""The shipped scenarios, and from where each is seen."""
+SPLIT: dict[bool, dict[str, Any]] = {True: {"height_ratios": (5.0, 1.0)}, False: {"width_ratios": (2.0, 1.0)}}
 UP = np.array([1.0, 0.0, 0.0])
 VIEW = np.array([0.38, 0.6, -0.7]) / np.linalg.norm([0.38, 0.6, -0.7])
 """Towards the viewer."""
@@ -120,6 +137,23 @@ def page(points: Floats) -> Floats:
     right = np.cross(UP, VIEW)
     right /= np.linalg.norm(right)
     return np.stack([points @ right, points @ np.cross(VIEW, right)], axis=-1)
+
+
+# ----------------------------------------------------------------------------------------------------------- gallery
+
+
+def gallery(name: str) -> Figure:
+    """A shipped scenario, bent and flat: the flat board below where it is long, else beside."""
+    shape = fb.solve(fb.load(ROOT / "scenarios" / f"{name}.toml"), strict=True)
+    outline = np.concatenate(shape.outline().loops)
+    is_long = np.ptp(outline[:, 1]) < 0.3 * np.ptp(outline[:, 0])
+    figure = Figure(figsize=(5.6, 3.6 if is_long else 3.0), layout="constrained")
+    bent, flat = figure.subplots(*((2, 1) if is_long else (1, 2)), **SPLIT[is_long])
+    plot.draw_oblique(bent, shape, GALLERY[name])
+    plot.draw_flat(flat, shape)
+    flat.set(title="", xlabel="", ylabel="")
+    flat.set_axis_off()
+    return figure
 
 
 # ------------------------------------------------------------------------------------------------------- convergence
@@ -262,12 +296,19 @@ def locking() -> Figure:
 def main() -> None:
     """Writes all pictures."""
     FIGURES.mkdir(exist_ok=True)
+    for name in GALLERY:
+        with mpl.rc_context(STYLE | {"axes.grid": False, "savefig.dpi": 150.0}):
+            save(gallery(name), f"gallery_{name}")
     for draw in (examples, convergence, bound, bend_radius, shell_thickness, collocation, locking):
         with mpl.rc_context(STYLE):
-            figure = draw()
-            path = FIGURES / f"{draw.__name__}.png"
-            figure.savefig(path, metadata={"Software": None})
-        print(f"{path.relative_to(FIGURES.parent.parent)}: {path.stat().st_size // 1024} kB")
+            save(draw(), draw.__name__)
+
+
+def save(figure: Figure, name: str) -> None:
+    """Writes a picture and says how large it is."""
+    path = FIGURES / f"{name}.png"
+    figure.savefig(path, metadata={"Software": None}, bbox_inches="tight" if name.startswith("gallery") else None)
+    print(f"{path.relative_to(ROOT)}: {path.stat().st_size // 1024} kB")
 
 
 if __name__ == "__main__":

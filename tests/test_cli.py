@@ -57,6 +57,19 @@ def test_the_table_tells_what_people_ask_for(run, example_file):
         assert f"moment on the belt, {place}" in out
 
 
+def test_the_table_tells_of_loads_links_and_hinges(run, example):
+    tables = example.to_dict()
+    tables["belt"]["density"] = 1.0
+    tables["supports"][1] |= {"hinge": "zeta"}
+    tables["links"] = [{"from": 0.3, "to": 0.7, "offset": [0.0, 0.2, 0.0]}]
+    tables["loads"] = {"gravity": [-1.0, 0.0, 0.0], "points": [{"at": 0.5, "force": [0.0, 0.0, 2.0]}]}
+    Path("loaded.json").write_text(json.dumps(tables), "utf-8")
+    code, out, _ = run("solve", "loaded.json")
+    assert code == 0
+    for words in ("end hinged about zeta", "gravity", "load, u = 0.5", "force of the link from u = 0.3, u = 0.7"):
+        assert words in out
+
+
 def test_all_outputs_are_written_and_nothing_else(run, example_file):
     code, _, _ = run("solve", example_file, "--out", "a.json", "--figure", "a.png", "--mesh", "a.stl")
     assert code == 0

@@ -68,6 +68,8 @@ def _supports(equilibrium: Equilibrium) -> str:
 
 def _held(support: dict[str, Any]) -> str:
     """What a support holds, in a word."""
+    if support.get("hinge") is not None:
+        return f"hinged about {support['hinge']}"
     position = support.get("position")
     turned = any(support.get(key) is not None for key in ("rotation", "euler", "quaternion"))
     if position is not None and "free" in position:
@@ -82,6 +84,9 @@ def _quantities(equilibrium: Equilibrium) -> Iterator[tuple[str, str, str]]:
     if equilibrium.elastic_energy != equilibrium.energy:
         yield "elastic energy", number(equilibrium.elastic_energy), ""
     yield from _extremes(equilibrium)
+    half_turns = equilibrium.to_dict().get("half_turns")
+    if half_turns is not None:
+        yield "half turns", str(half_turns), "of a closed belt"
     yield "local minimum", {True: "yes", False: "no", None: "not known"}[equilibrium.stable], ""
     for name, residual in equilibrium.residuals._asdict().items():
         yield f"residual, {name}", f"{residual:.1e}", ""
@@ -114,11 +119,26 @@ def _vectors(equilibrium: Equilibrium) -> Table:
 def _named_vectors(equilibrium: Equilibrium) -> Iterable[tuple[str, Floats]]:
     u, position = equilibrium.highest_point
     yield f"highest point, u = {number(u)}", position
-    for index, support in enumerate(equilibrium.scenario.to_dict()["supports"]):
+    tables = equilibrium.scenario.to_dict()
+    yield from _loads(tables, equilibrium.u)
+    for index, support in enumerate(tables["supports"]):
         place = _place(support["at"], equilibrium.u)
         force, moment = equilibrium.reaction(index)
         yield f"force on the belt, {place}", force
         yield f"moment on the belt, {place}", moment
+    forces = [np.array(link["force"]) for link in equilibrium.to_dict()["links"]]
+    # A method that knows no forces gives none.
+    for link, force in zip(tables.get("links", []), forces, strict=False):
+        ends = [_place(link[end], equilibrium.u) for end in ("from", "to")]
+        yield f"force of the link from {ends[0]}, {ends[1]}", force
+
+
+def _loads(tables: dict[str, Any], u: Floats) -> Iterator[tuple[str, Floats]]:
+    loads = tables.get("loads", {})
+    if loads.get("gravity") is not None:
+        yield "gravity", np.array(loads["gravity"])
+    for load in loads.get("points", []):
+        yield f"load, {_place(load['at'], u)}", np.array(load["force"])
 
 
 def _place(at: float | str, u: Floats) -> str:
