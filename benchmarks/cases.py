@@ -79,10 +79,21 @@ def shell(name: str) -> dict[str, Any]:
 
 
 def on_shell(name: str, energy: str) -> fb.Equilibrium:
-    """The belt of a shell reference."""
+    """The belt of a shell reference; of a curved board, which has states on both sides, the one on the shell's."""
     data = shell(name)
     turn = Rotation.from_matrix(data["end_rotation_matrix"]).as_rotvec()
-    return solve(clamped(data["end_position"], turn, **{key: data[key] for key in ("length", "width")}), energy)
+    tables = clamped(data["end_position"], turn, **{key: data[key] for key in ("length", "width")})
+    if "segments" not in data:
+        return solve(tables, energy)
+    tables["belt"]["segments"] = [_strip(length, curvature) for length, curvature in data["segments"]]
+    sides = [solve(tables | {"solver": {"bulge": [side, 0.0, 0.0]}}, energy) for side in (1.0, -1.0)]
+    return min(sides, key=lambda belt: _distance(belt, data))
+
+
+def _strip(length: float, curvature: float) -> dict[str, Any]:
+    if curvature == 0.0:
+        return {"kind": "straight", "length": length}
+    return {"kind": "arc", "length": length, "curvature": curvature}
 
 
 def curve(u: Any, position: Any, tangent: Any) -> CubicHermiteSpline:
@@ -100,9 +111,33 @@ def shell_peak(name: str) -> Floats:
 
 def distance_to_shell(name: str, energy: str) -> float:
     """RMS distance of the spine from the shell's centre line, over the shell's 101 points."""
-    data, belt = shell(name), on_shell(name, energy)
-    spine = curve(belt.u, belt.position, belt.frame[:, :, 1])
+    return _distance(on_shell(name, energy), shell(name))
+
+
+def _distance(belt: fb.Equilibrium, data: dict[str, Any]) -> float:
+    # Nodes are repeated where fields may jump.
+    nodes = np.flatnonzero(np.diff(belt.u, prepend=-1.0) > 0.0)
+    spine = curve(belt.u[nodes], belt.position[nodes], belt.frame[nodes, :, 1])
     return float(np.sqrt(np.mean(np.sum((spine(data["u"]) - data["position"]) ** 2, axis=1))))
+
+
+def heavy(weight: float, *, edgewise: bool, push: float = 0.0, **belt: Any) -> dict[str, Any]:
+    """A cantilever of unit length under its own weight, flat or standing on edge; its rib at the clamp is free."""
+    start = clamped((0.0, 0.0, 0.0), square_rib=False, **belt)
+    return {
+        "belt": start["belt"] | {"density": 1.0},
+        "supports": start["supports"][:1],
+        "loads": {
+            "gravity": [0.0, 0.0, -weight] if edgewise else [-weight, 0.0, 0.0],
+            "points": [{"at": "end", "force": [push, 0.0, 0.0]}] if push else [],
+        },
+    }
+
+
+def closed(half_turns: int) -> dict[str, Any]:
+    """The band of Starostin and van der Heijden: length 2π, half-width π/30, plate rigidity 1."""
+    board = example("mobius")["belt"]
+    return {"belt": board | {"half_turns": half_turns}}
 
 
 class Refinement(NamedTuple):

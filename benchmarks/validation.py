@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.integrate import solve_bvp
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
@@ -18,9 +19,11 @@ from cases import (
     EXAMPLES,
     SHEET,
     clamped,
+    closed,
     distance_to_shell,
     example,
     gentle_arc,
+    heavy,
     helix,
     orders,
     refine,
@@ -28,7 +31,8 @@ from cases import (
     shell_peak,
     solve,
 )
-from tables import number, scientific, table, vector, write
+from fishbone import examples as shipped
+from tables import ROOT, number, scientific, table, vector, write
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -54,7 +58,12 @@ SHELL_CASES = (
     "offset05",
     "offset10_far",
     "planar",
+    "curved",
+    "curved_h8",
+    "rounded_corner",
+    "rounded_corner_h8",
 )
+GALLERY = ROOT / "docs" / "gallery.md"
 MESHES = (40, 80, 160, 320, 640, 1280)
 REPETITIONS = 31
 
@@ -107,6 +116,66 @@ def cylinder_rows() -> Iterator[list[str]]:
         position, frame = helix(-(np.cos(angle) ** 2) / 0.5, np.tan(angle))
         tables = clamped(position, frame.as_rotvec(), square_rib=False)
         yield [number(angle, 1), *(number(solve(tables, energy).energy, 6) for energy in ENERGIES)]
+
+
+def published_rows() -> Iterator[list[str]]:
+    """Weight, closed belts: what is published or known, and ours on two meshes."""
+    for weight in (5.0, 20.0, 50.0):
+        tables = heavy(weight, edgewise=False)
+        sags = [-solve(tables, "wunderlich", elements).position[-1, 0] for elements in (80, 320)]
+        yield _published(f"heavy elastica, weight {weight:g} R_f/U²: sag of its end [U]", heavy_sag(weight), sags, 5)
+    thresholds = [buckling_weight(elements) for elements in (100, 400)]
+    yield _published("belt on edge buckles by its weight at [R_f/U²], `sadowsky`, V = U/50", 21.491, thresholds, 2)
+    half_width = np.pi / 30.0
+    for title, half_turns, exact in (("Möbius band", 1, 18.63), ("ring", 0, 2.0 * np.pi)):
+        energies = [solve(closed(half_turns), "wunderlich", elements).energy for elements in (240, 960)]
+        yield _published(f"{title}: energy over D V/2", exact, [energy / half_width for energy in energies], 3)
+
+
+def _published(title: str, exact: float, found: list[float], decimals: int) -> list[str]:
+    return [title, f"{exact:.{decimals}f}", *(number(value, decimals) for value in found)]
+
+
+def heavy_sag(weight: float) -> float:
+    """How far the end of the heavy elastica hangs down: R_f a'' = −q (U − u) cos a, by collocation."""
+
+    def slope(u: Any, a: Any) -> Any:
+        return np.stack([a[1], -weight * (1.0 - u) * np.cos(a[0]), np.sin(a[0])])
+
+    u = np.linspace(0.0, 1.0, 200)
+    start = np.stack([np.minimum(weight * u / 3.0, 1.2), 0.0 * u, u])
+    found = solve_bvp(slope, lambda a, b: np.array([a[0], b[1], a[2]]), u, start, tol=1e-9, max_nodes=100_000)
+    assert found.success
+    return float(found.y[2, -1])
+
+
+def buckling_weight(elements: int) -> float:
+    """Weight at which the buckled state has no amplitude, of which the elastic energy is the square."""
+    weights = np.array([22.0, 22.5, 23.0, 24.0, 25.0])
+    board = {"width": 0.02}
+    squares = [
+        solve(heavy(weight, edgewise=True, push=0.002, **board), "sadowsky", elements).elastic_energy
+        for weight in weights
+    ]
+    return float(np.polynomial.Polynomial.fit(squares, weights, 2)(0.0))
+
+
+def gallery_rows() -> Iterator[list[str]]:
+    """The shipped scenarios as they are."""
+    for name in shipped.names():
+        belt = fb.solve(fb.load(ROOT / "scenarios" / f"{name}.toml"), strict=True)
+        on_spine = belt.least_spine_radius
+        assert on_spine is not None
+        force = np.linalg.norm(belt.reaction(0).force) if belt.scenario.to_dict()["supports"] else None
+        yield [
+            f"[`{name}`](#{name})",
+            f"`{belt.energy_model}`",
+            f"{belt.energy:.4g}".replace("-", "−"),
+            f"{on_spine.value:.4g}",
+            "" if force is None else f"{force:.4g}",
+            {True: "yes", None: "not known"}[belt.stable],
+            str(belt.iterations),
+        ]
 
 
 def convergence_rows() -> Iterator[list[str]]:
@@ -175,6 +244,10 @@ def main() -> None:
     header = ["d [U]", "elements", "energy", "height", "thrust", "error", "error", "error"]
     write("elastica", table(header, elastica_rows()))
     write("cylinder", table(["winding angle [rad]", *by_energy], cylinder_rows()))
+    header = ["case", "published or exact", "coarse mesh", "four times as fine"]
+    write("published", table(header, published_rows()))
+    header = ["scenario", "density", "energy", "least radius", "force at the start", "minimum", "iterations"]
+    write("gallery", table(header, gallery_rows()), GALLERY)
     header = [
         "elements",
         *(f"gentle arc, `{energy}`" for energy in ("fishbone", "wunderlich")),
