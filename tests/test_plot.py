@@ -8,7 +8,7 @@ import pytest
 import trimesh
 
 import fishbone as fb
-from fishbone import examples, export, plot
+from fishbone import examples, export, plot, scene
 
 
 def test_the_views_have_one_scale(equilibrium):
@@ -141,12 +141,12 @@ def test_the_key_names_what_the_picture_has_and_nothing_else(equilibrium, exampl
 
 def test_arrows_of_forces_lie_within_the_views(example):
     equilibrium = fb.solve(everything(example))
-    scene = plot._Scene(equilibrium)
-    assert len(scene.arrows) == 1
-    for arrow in scene.arrows:
+    page = scene.Scene(equilibrium)
+    assert len(page.arrows) == 1
+    for arrow in page.arrows:
         for point in (arrow.at, arrow.at + arrow.reach):
-            assert (scene.low < point).all()
-            assert (point < scene.high).all()
+            assert (page.low < point).all()
+            assert (point < page.high).all()
 
 
 @pytest.mark.parametrize("name", examples.names())
@@ -160,13 +160,13 @@ def test_every_shipped_scenario_is_drawn(name, tmp_path):
 
 def test_strips_hold_every_triangle_once_and_the_whole_spine(example):
     equilibrium = fb.solve(everything(example))
-    strips = list(plot._strips(equilibrium))
+    strips = list(scene.strips_of(equilibrium))
     _, triangles = equilibrium.mesh(2)
     assert sum(len(strip.faces) for strip in strips) == len(triangles)
     rigid = [strip for strip in strips if strip.rigid]
     assert len(rigid) == 1
     edges = sum(
-        np.linalg.norm(line[1] - line[0]) for strip in strips for line, style in strip.lines if style is plot._EDGE
+        np.linalg.norm(line[1] - line[0]) for strip in strips for line, style in strip.lines if style is scene.EDGE
     )
     outline = equilibrium.outline().loops[0]
     assert edges == pytest.approx(np.linalg.norm(np.diff(outline, axis=0), axis=1).sum(), rel=1e-3)
