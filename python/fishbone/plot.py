@@ -258,7 +258,7 @@ def draw_flat(axes: Axes, equilibrium: Equilibrium) -> None:
     faces = vertices[triangles]
     shades = np.where(is_rigid(equilibrium, feet_of(equilibrium)), LIGHT - RIGID, LIGHT)
     colors = [str(shade) for shade in shades]
-    axes.add_collection(PolyCollection(list(faces), facecolors=colors, edgecolors=colors, linewidths=0.3, zorder=2))
+    axes.add_collection(PolyCollection(list(faces), facecolors=colors, edgecolors=colors, linewidths=0.6, zorder=2))
     ribs = equilibrium.flat_ribs()[drawn_ribs(equilibrium.u)]
     axes.add_collection(LineCollection(list(ribs), zorder=2, colors=RIB["color"], linewidths=RIB["linewidth"]))
     for line in equilibrium.outline().loops:

@@ -148,7 +148,7 @@ def _draw_strips(axes: Axes, strips: list[Strip], view: View, *, lit: bool) -> N
             paths.append(Path(view.page(face), closed=False))
             fills.append(shade)
             strokes.append(shade)
-            widths.append(0.3)
+            widths.append(0.6)
         for line, style in strip.lines:
             paths.append(Path(view.page(line)))
             fills.append("none")
