@@ -31,6 +31,7 @@ from helpers import (
     rotation_matrix,
     rotation_vector,
     solve,
+    solve_any,
     spine_at,
     straight,
     support,
@@ -435,3 +436,13 @@ def test_board_run_backwards_takes_the_same_shape(energy: Energy) -> None:
     other = solve(board(backwards, supports, energy=energy, elements=80, bulge=(1.0, 0.0, 0.0)))
     assert other.energy == pytest.approx(one.energy, rel=1e-6)
     assert np.max(np.abs(other.position[::-1] - one.position)) < 1e-5
+
+
+def test_ribs_that_cross_beyond_half_the_width_beside_a_bend_are_warned_of() -> None:
+    """A Z-shaped board folded so far that its ribs run steeply past the corners; gently bent it has nothing to say."""
+    segments = [straight(0.2), corner(math.pi / 2.0), straight(0.4), corner(-math.pi / 2.0), straight(0.2)]
+    pieces = [rigid(0.1), *segments, rigid(0.1)]
+    folded = solve_any(held(pieces, (0.26, 0.15, 0.36), (0.0, 0.0, -2.0944), width=0.0667))
+    assert folded.status != "converged" or any("ribs cross" in warning for warning in folded.warnings)
+    gentle = solve(held([straight(0.5), corner(0.3), straight(0.5)], (0.1, 0.7, 0.1), (0.3, 0.0, 0.0)))
+    assert not any("ribs cross" in warning for warning in gentle.warnings)

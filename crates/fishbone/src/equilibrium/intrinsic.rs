@@ -2,7 +2,9 @@
 
 use super::assembly::Assembly;
 use super::search::Search;
-use super::{Equilibrium, LinkForce, Reaction, Status, Units, Wrench, excess_distance, is_taut};
+use super::{
+    Equilibrium, LinkForce, Reaction, Status, Units, Wrench, excess_distance, is_taut, number,
+};
 use crate::belt::Belt;
 use crate::guess::{disturb, guess};
 use crate::lie::Pose;
@@ -11,6 +13,7 @@ use crate::program::{self, BeltPoint, BeltProgram};
 use crate::scenario::{Scenario, SupportSpec};
 use crate::solver::{Curvature, Outcome, Solution, dependent_constraints};
 use crate::spine::{Piece, Spine};
+use crate::surface::fold;
 use nalgebra::Vector3;
 use std::ops::ControlFlow;
 
@@ -55,6 +58,7 @@ pub(super) fn solve(
         warnings: [
             warnings(scenario, &program, stable),
             doubts(scenario, status, said_twice, half_turns(&spine)),
+            folds(&spine, status),
         ]
         .concat(),
         half_turns: half_turns(&spine),
@@ -155,6 +159,19 @@ fn judge(
             format!("interrupted after {iterations} iterations, largest residual {largest:.1e}"),
         ),
     }
+}
+
+/// Says where the surface folds over itself beside a bend of the board.
+fn folds(spine: &Spine, status: Status) -> Vec<String> {
+    let fold = fold(spine).filter(|_| status == Status::Converged);
+    let said = fold.map(|u| {
+        format!(
+            "ribs cross near an edge at u = {}, beside a bend or an arc where steep ribs reach farther than V/2: no board \
+             can take that shape there; try another solver.bulge, a narrower board or a gentler bend",
+            number(u)
+        )
+    });
+    said.into_iter().collect()
 }
 
 /// What should be known of constraints and turns before the result is relied on.

@@ -2,7 +2,7 @@
 
 use super::board::Board;
 use super::curvature::{bend_radius, curvature};
-use super::rib::{rib_convergence, rib_convergence_bound};
+use super::rib::{Rib, rib_convergence, rib_convergence_bound, ribs};
 use crate::spine::{Piece, Spine, SpinePoint};
 use nalgebra::Vector3;
 
@@ -236,6 +236,26 @@ pub fn rib_margin(spine: &Spine) -> RibMargin {
     };
     let narrower = |a: RibMargin, b: RibMargin| if b.value < a.value { b } else { a };
     strips(spine).map(margin).fold(start, narrower)
+}
+
+/// Arc length where neighbouring ribs cross inside the board although they do not within V/2 of the spine; `None` where
+/// none do.
+///
+/// Beside a bend or a tight arc a steep rib leaves the board far beyond V/2.
+pub fn fold(spine: &Spine) -> Option<f64> {
+    /// What rounding and the length of the elements may do to ribs that just touch.
+    const CLEARLY: f64 = 1.05;
+    let bends = |piece: &Piece| piece.geodesic() != 0.0 || piece.corner() != 0.0;
+    if !spine.pieces.iter().any(bends) {
+        return None;
+    }
+    let ribs = ribs(spine);
+    let crosses = |element: &usize| {
+        let s = mean_convergence(spine, *element);
+        let reach = |rib: &Rib| (s * rib.v_plus).max(s * rib.v_minus);
+        reach(&ribs[*element]).max(reach(&ribs[element + 1])) > CLEARLY
+    };
+    strips(spine).find(crosses).map(|element| spine.u[element])
 }
 
 #[cfg(test)]
