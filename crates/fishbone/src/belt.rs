@@ -5,6 +5,7 @@ use crate::energy::Curl;
 use crate::lie::gauss_points;
 use crate::program::Piece;
 use crate::scenario::{BeltSpec, Rigidity, SAME_PLACE, SegmentSpec};
+use crate::strip::FURTHER;
 
 /// A belt in the units of its scenario.
 #[derive(Debug, Clone, PartialEq)]
@@ -277,6 +278,7 @@ impl Belt {
                     bend: strip.curl.bend * length,
                     ..strip.curl
                 },
+                further: [None; FURTHER],
             })
         })
     }

@@ -5,7 +5,8 @@
 
 use crate::energy::{Curl, EnergyModel, Term};
 use crate::lie::{Coefficients, Pose, Twist, gauss_points, hat, magnus};
-use crate::strip::{Across, SlopeJet, Strips};
+use crate::solver::BOUNDS;
+use crate::strip::{Across, Edge, FURTHER, SlopeJet, Strips};
 use nalgebra::{Matrix2x4, Matrix3, Matrix3x4, Matrix4, Vector3, Vector4};
 
 /// Torsion ω_η = −β ω_ζ.
@@ -44,6 +45,8 @@ pub struct Element {
     pub half_width: f64,
     /// What the element is bent to when nothing acts on it.
     pub curl: Curl,
+    /// Edges of the board, besides those of its own stretch, before which its ribs must not cross either.
+    pub further: [Option<Edge>; FURTHER],
 }
 
 /// An increment with its derivatives by the four unknowns.
@@ -194,23 +197,25 @@ impl GaussFields {
 }
 
 impl Element {
-    fn strips(&self) -> Strips {
+    /// The strips between its ribs.
+    pub fn strips(&self) -> Strips {
         Strips {
             half_width: self.half_width,
             geodesic: self.geodesic,
             length: self.length,
+            further: self.further,
         }
     }
 
-    /// How far the ribs are from crossing at the +ζ and at the −ζ edge; admissible where positive.
+    /// How far the ribs are from crossing at the edges, as [`Strips::slacks`]; admissible where positive.
     ///
     /// Source: Eq. (33), extended to curved belts
-    pub fn slacks(&self, fields: &Vector4<f64>) -> [f64; 2] {
+    pub fn slacks(&self, fields: &Vector4<f64>) -> [f64; BOUNDS] {
         self.strips().slacks([fields[1], fields[3]])
     }
 
     /// The same with derivatives.
-    pub fn slack_jets(&self, fields: &Vector4<f64>) -> [Jet; 2] {
+    pub fn slack_jets(&self, fields: &Vector4<f64>) -> [Jet; BOUNDS] {
         self.strips()
             .slack_jets([fields[1], fields[3]])
             .map(Jet::from)
@@ -522,6 +527,7 @@ mod tests {
                         bend: 2.0 * geodesic,
                         poisson: 0.34,
                     },
+                    further: [None; FURTHER],
                 };
                 cases.push((
                     element,

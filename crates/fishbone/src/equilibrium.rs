@@ -1,5 +1,6 @@
 //! From a scenario to an equilibrium.
 
+mod apart;
 mod assembly;
 mod intrinsic;
 mod ritz;

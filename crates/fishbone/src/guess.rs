@@ -460,6 +460,7 @@ mod tests {
     use crate::element::Element;
     use crate::energy::{Curl, EnergyModel};
     use crate::program::Hold;
+    use crate::strip::FURTHER;
 
     fn held(node: usize, position: [f64; 3], rotation: Option<[f64; 3]>) -> NodeSupport {
         NodeSupport {
@@ -479,6 +480,7 @@ mod tests {
             rigidity: [1.0; 2],
             half_width: 0.05,
             curl: Curl::default(),
+            further: [None; FURTHER],
         };
         BeltProgram::new(vec![Piece::Strip(element); 40], EnergyModel::Wunderlich)
             .with_supports(supports)
@@ -563,6 +565,7 @@ mod tests {
                 rigidity: [1.0; 2],
                 half_width: 0.05,
                 curl: Curl::default(),
+                further: [None; FURTHER],
             };
             pieces.extend([Piece::Strip(element); 40]);
         }

@@ -16,11 +16,15 @@ use crate::element::{Element, IncrementJet, Jet};
 use crate::energy::EnergyModel;
 use crate::lie::{Pose, hat};
 use crate::solver::chain::{NodeVector, Stage};
-use crate::solver::{Bounds, Linearisation, Program, Rows, Values};
+use crate::solver::{BOUNDS, Bounds, Linearisation, Program, Rows, Values};
 use crate::spine::turn;
 use nalgebra::{Matrix3, Matrix4, Rotation3, UnitQuaternion, Vector2, Vector3, Vector4};
 
 /// What joins a node to the next.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "nearly all pieces are strips, read one after the other"
+)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Piece {
     /// A flexible element.
@@ -440,7 +444,7 @@ impl Program for BeltProgram {
         for (k, piece) in self.pieces.iter().enumerate() {
             values.slacks.push(match piece {
                 Piece::Strip(element) => element.slacks(&Self::fields_of(&point.fields, k)),
-                Piece::Rigid { .. } | Piece::Joint { .. } => [1.0; 2],
+                Piece::Rigid { .. } | Piece::Joint { .. } => [1.0; BOUNDS],
             });
             if self.is_tied(k + 1) && self.carried_slope(point, k + 1).is_none() {
                 return false;
@@ -529,7 +533,7 @@ impl BeltProgram {
                 let motion = piece.motion(&Vector4::zeros());
                 let force = pose.frame.tr_mul(&adjoint.force);
                 into.chain.stages[k] = carry_state(&pose.frame, &motion, &force);
-                into.slacks[k] = [Vector4::zeros(); 2];
+                into.slacks[k] = [Vector4::zeros(); BOUNDS];
                 motion
             }
         };
@@ -550,7 +554,7 @@ impl BeltProgram {
         k: usize,
         element: &Element,
         point: &BeltPoint,
-        bounds: &[f64; 2],
+        bounds: &[f64; BOUNDS],
         beyond: &Adjoint,
         into: &mut Linearisation,
     ) -> Pose {
@@ -559,9 +563,9 @@ impl BeltProgram {
         let jet = element.increment_jet(&fields);
         let force = frame.tr_mul(&beyond.force);
         let energy = element.energy_jet(self.model, &fields);
-        let slacks: [Jet; 2] = element.slack_jets(&fields);
+        let slacks: [Jet; BOUNDS] = element.slack_jets(&fields);
         let mut controls = energy.hessian + element.increment_hessian(&jet, &force, &beyond.moment);
-        if element.geodesic != 0.0 {
+        if !element.strips().has_linear_bounds() {
             for (slack, multiplier) in slacks.iter().zip(bounds) {
                 controls -= *multiplier * slack.hessian;
             }
@@ -688,6 +692,7 @@ fn carry_controls(
 mod tests {
     use super::*;
     use crate::energy::Curl;
+    use crate::strip::Edge;
 
     fn element(length: f64, geodesic: f64) -> Piece {
         Piece::Strip(Element {
@@ -699,6 +704,16 @@ mod tests {
                 bend: 0.8,
                 poisson: 0.3,
             },
+            further: [
+                None,
+                Some(Edge::line(Vector2::new(0.8, 0.6), 0.03)),
+                Some(Edge {
+                    direction: Vector2::x(),
+                    distance: 0.05,
+                    curvature: 4.0,
+                    turn: [-0.5, 0.4],
+                }),
+            ],
         })
     }
 
@@ -828,7 +843,9 @@ mod tests {
         let multipliers: Vec<Rows> = (0..5)
             .map(|k| Rows::from_fn(|i, _| 0.7 + 0.6 * f64::from(k) - 0.4 * i as f64))
             .collect();
-        let bounds: Bounds = (0..9).map(|k| [0.3 + 0.1 * f64::from(k), 0.5]).collect();
+        let bounds: Bounds = (0..9)
+            .map(|k| [0.3 + 0.1 * f64::from(k), 0.5, 0.2, 0.7, 0.4])
+            .collect();
         let mut linear = Linearisation::new(&program);
         program.linearise(&at, &multipliers, &bounds, &mut linear);
         let mut gradient = linear.gradient.clone();

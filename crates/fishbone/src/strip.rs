@@ -2,6 +2,7 @@
 //!
 //! A strip is known by the rib slope β and by s = β' + κ_g (1+β²): at v it is `1 − v s` times as wide as on the spine.
 
+use crate::solver::BOUNDS;
 use nalgebra::{Matrix2, Vector2};
 use num_dual::{Derivative, Dual2SVec64, DualNum};
 
@@ -93,6 +94,75 @@ impl From<Dual2SVec64<2>> for SlopeJet {
     }
 }
 
+/// A line or an arc of the board's outline as seen from the foot of a rib, by the tangent nearest to the foot.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Edge {
+    /// Direction of that tangent along and across the spine at the foot, (cos δ, sin δ).
+    pub direction: Vector2<f64>,
+    /// Its distance c from the foot, negative on the −ζ side.
+    pub distance: f64,
+    /// Curvature, 0 of a line; towards the side on which the edge lies.
+    pub curvature: f64,
+    /// Turns of its first and last tangent from the nearest one, rising.
+    pub turn: [f64; 2],
+}
+
+impl Edge {
+    /// A straight line.
+    pub fn line(direction: Vector2<f64>, distance: f64) -> Self {
+        Self {
+            direction,
+            distance,
+            curvature: 0.0,
+            turn: [0.0; 2],
+        }
+    }
+
+    /// How far ribs are from crossing before they reach the edge: the least of `cos δ + β sin δ − s c` over its tangents.
+    ///
+    /// A rib meets a tangent at v = c/(cos δ + β sin δ), so this is 1 − s v in other words; but it counts a rib so
+    /// steep that it passes the edge by as crossing others.
+    pub fn slack<D: DualNum<Primitive = f64> + Copy>(&self, slope: D, s: D) -> D {
+        let (along, across) = (self.direction.x, self.direction.y);
+        let nearest = slope * across - s * self.distance + along;
+        if self.curvature == 0.0 {
+            return nearest;
+        }
+        // Over the tangents it is a sine of their turn.
+        let quarter = slope * along - across;
+        let (k, side) = (self.curvature, self.curvature.signum());
+        let beyond = s - nearest * k;
+        let lowest = (-quarter.re() * k.abs()).atan2(side * beyond.re());
+        if (self.turn[0]..=self.turn[1]).contains(&lowest) {
+            let square = beyond * beyond + quarter * quarter * (k * k);
+            if square.re() == 0.0 {
+                // Ribs that meet in the centre of the arc are as far from all of its tangents.
+                return nearest;
+            }
+            let amplitude = square.sqrt();
+            let squares = nearest * nearest + quarter * quarter;
+            return (nearest * s * 2.0 - squares * k) * side / (s * side + amplitude);
+        }
+        let at = |turn: f64| {
+            nearest * turn.cos() + quarter * turn.sin() + s * (2.0 * (0.5 * turn).sin().powi(2) / k)
+        };
+        let [first, last] = self.turn.map(at);
+        if first < last { first } else { last }
+    }
+
+    /// The same edge in other units: lengths times a factor.
+    pub fn scaled(&self, factor: f64) -> Self {
+        Self {
+            distance: self.distance * factor,
+            curvature: self.curvature / factor,
+            ..*self
+        }
+    }
+}
+
+/// Most edges that bound ribs besides those of their own stretch.
+pub const FURTHER: usize = BOUNDS - 2;
+
 /// The strips of one element: of half the width, in-plane curvature κ_g, and length.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Strips {
@@ -102,6 +172,8 @@ pub struct Strips {
     pub geodesic: f64,
     /// Length along the spine.
     pub length: f64,
+    /// Edges of the board, besides those of the stretch, before which ribs must not cross either.
+    pub further: [Option<Edge>; FURTHER],
 }
 
 /// An inner edge tighter than this, in V/2, counts as this tight: the true one is trimmed.
@@ -117,14 +189,14 @@ impl Strips {
         (mean, rise + (mean * mean + 1.0) * self.geodesic)
     }
 
-    /// How far the ribs are from crossing inside the width, by slopes at both ends of the element: `1 − s v` at the
-    /// +ζ edge, then at the −ζ edge.
+    /// How far the ribs are from crossing on the board, by slopes at both ends of the element: `1 − s v` at the +ζ and
+    /// at the −ζ edge of the stretch, then [`Edge::slack`] at the further edges, 1 where there are none.
     ///
     /// On an arc v is where the rib meets the inner edge; towards the outer one, which a rib meets before V/2, it is V/2
     /// all the same, so that |s| ≤ 2/V holds everywhere.
     ///
     /// Source: Eq. (33)
-    pub fn slacks<D: DualNum<Primitive = f64> + Copy>(&self, slopes: [D; 2]) -> [D; 2] {
+    pub fn slacks<D: DualNum<Primitive = f64> + Copy>(&self, slopes: [D; 2]) -> [D; BOUNDS] {
         let (mean, s) = self.measure(slopes);
         let w = self.half_width;
         let [minus, plus] = if self.geodesic == 0.0 {
@@ -134,7 +206,12 @@ impl Strips {
         } else {
             [self.ends(mean)[0], D::from(w)]
         };
-        [-s * plus + 1.0, -s * minus + 1.0]
+        let further = |edge: &Option<Edge>| match edge {
+            None => D::one(),
+            Some(edge) => edge.slack(mean, s),
+        };
+        let [a, b, c] = self.further.each_ref().map(further);
+        [-s * plus + 1.0, -s * minus + 1.0, a, b, c]
     }
 
     /// Where the rib of this slope meets the edges, v₋ and v₊: `v − κ_g v² (1+β²)/2 = ±V/2 − κ_g V²/8`.
@@ -166,12 +243,20 @@ impl Strips {
         }
     }
 
+    /// Whether the slacks are linear in the slopes.
+    pub fn has_linear_bounds(&self) -> bool {
+        self.geodesic == 0.0 && self.further == [None; FURTHER]
+    }
+
     /// The slacks with derivatives.
-    pub fn slack_jets(&self, slopes: [f64; 2]) -> [SlopeJet; 2] {
-        if self.geodesic == 0.0 {
+    pub fn slack_jets(&self, slopes: [f64; 2]) -> [SlopeJet; BOUNDS] {
+        if self.has_linear_bounds() {
             let rate = self.half_width / self.length;
             let y = rate * (slopes[1] - slopes[0]);
-            return [-1.0, 1.0].map(|sign| SlopeJet::of_share(rate, [1.0 + sign * y, sign, 0.0]));
+            let [plus, minus] =
+                [-1.0, 1.0].map(|sign| SlopeJet::of_share(rate, [1.0 + sign * y, sign, 0.0]));
+            let none = SlopeJet::constant(1.0);
+            return [plus, minus, none, none, none];
         }
         self.slacks(variables(slopes)).map(SlopeJet::from)
     }
@@ -257,6 +342,7 @@ mod tests {
             half_width: 0.05,
             geodesic,
             length: 0.0125,
+            further: [None; FURTHER],
         }
     }
 
@@ -316,6 +402,47 @@ mod tests {
                 assert!((mirrored[0] + plus).abs() < 1e-15 && (mirrored[1] + minus).abs() < 1e-15);
             }
         }
+    }
+
+    #[test]
+    fn test_slack_at_an_edge_is_the_least_over_its_tangents() {
+        // By the points of the arc and their tangents, from a centre and a radius.
+        for (curvature, nearest, distance) in [(4.0f64, 0.3f64, 0.05f64), (-9.0, -0.8, -0.03)] {
+            let edge = Edge {
+                direction: Vector2::new(nearest.cos(), nearest.sin()),
+                distance,
+                curvature,
+                turn: [-0.6, 0.5],
+            };
+            let radius = 1.0 / curvature;
+            let left = |angle: f64| Vector2::new(-angle.sin(), angle.cos());
+            let centre = (distance + radius) * left(nearest);
+            for slope in [-1.5, -0.2, 0.0, 0.7, 2.0] {
+                for s in [-30.0, -12.0, -1.0, 0.0, 3.0, 15.0, 25.0] {
+                    let at = |i: i32| {
+                        let angle = nearest - 0.6 + 1.1 * f64::from(i) / 4000.0;
+                        let point = centre - radius * left(angle);
+                        let c = left(angle).dot(&point);
+                        angle.cos() + slope * angle.sin() - s * c
+                    };
+                    let least = (0..=4000).map(at).fold(f64::INFINITY, f64::min);
+                    assert!((edge.slack(slope, s) - least).abs() < 1e-5, "{slope} {s}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn test_ribs_that_meet_in_the_centre_of_an_arc_are_as_far_from_all_of_it() {
+        let edge = Edge {
+            direction: Vector2::x(),
+            distance: 0.05,
+            curvature: 1.0 / 0.2,
+            turn: [-0.3, 0.3],
+        };
+        let [slope, s] = variables([0.0, 4.0]);
+        let jet = SlopeJet::from(edge.slack(slope, s));
+        assert!((jet.value - 0.8).abs() < 1e-15 && jet.gradient.amax().is_finite());
     }
 
     #[test]

@@ -13,6 +13,7 @@ mod locate;
 mod mesh;
 mod outline;
 mod patch;
+mod reach;
 mod rib;
 
 pub use curvature::*;
@@ -21,6 +22,7 @@ pub use extremes::*;
 pub use flat::*;
 pub use mesh::*;
 pub use outline::*;
+pub use reach::*;
 pub use rib::*;
 
 #[cfg(test)]

@@ -2,8 +2,12 @@
 
 use super::Units;
 use crate::belt::{Belt, Break};
-use crate::program::{BeltProgram, DeadForce, Hold, NodeLink, NodeLoad, NodeSupport, Tie};
+use crate::lie::Pose;
+use crate::program::{
+    self, BeltPoint, BeltProgram, DeadForce, Hold, NodeLink, NodeLoad, NodeSupport, Tie,
+};
 use crate::scenario::{Axis, Place, SAME_PLACE, Scenario, SupportSpec};
+use crate::spine::{Piece, Spine};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use std::f64::consts::PI;
 
@@ -13,7 +17,7 @@ pub(super) struct Assembly<'a> {
     belt: &'a Belt,
     units: Units,
     /// Where the programme has its origin, so that a belt far from the world's loses no digits: at the first support.
-    pub(super) origin: Vector3<f64>,
+    origin: Vector3<f64>,
 }
 
 impl<'a> Assembly<'a> {
@@ -54,6 +58,32 @@ impl<'a> Assembly<'a> {
         program.weight = self.weight();
         program.half_turns = self.belt.half_turns;
         program
+    }
+
+    /// The spine of a shape, in the units of the scenario.
+    pub(super) fn spine(&self, program: &BeltProgram, point: &BeltPoint) -> Spine {
+        let length = self.units.length;
+        let pose = |pose: &Pose| Pose {
+            frame: pose.frame,
+            position: self.origin + pose.position * length,
+        };
+        let piece = |piece: &program::Piece| match piece {
+            program::Piece::Strip(element) => Piece::Strip {
+                geodesic: element.geodesic / length,
+            },
+            program::Piece::Rigid { .. } => Piece::Rigid,
+            program::Piece::Joint { angle } => Piece::Joint { angle: *angle },
+        };
+        let nodes = program.nodes();
+        Spine {
+            width: self.belt.width,
+            pieces: program.pieces.iter().map(piece).collect(),
+            half_turns: self.belt.half_turns,
+            u: nodes.iter().map(|u| u * length).collect(),
+            pose: point.poses.iter().map(pose).collect(),
+            bend: point.fields.iter().map(|f| f[0] / length).collect(),
+            rib_slope: point.fields.iter().map(|f| f[1]).collect(),
+        }
     }
 
     /// What the potential of the loads lacks for its zero to be at the world's origin and not at the programme's.

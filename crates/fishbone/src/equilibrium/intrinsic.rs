@@ -1,5 +1,6 @@
 //! The intrinsic method: the interior-point search in the two fields bend and rib slope.
 
+use super::apart::keep_apart;
 use super::assembly::Assembly;
 use super::search::Search;
 use super::{
@@ -7,13 +8,10 @@ use super::{
 };
 use crate::belt::Belt;
 use crate::guess::{disturb, guess};
-use crate::lie::Pose;
 use crate::linking::half_turns;
 use crate::program::{self, BeltPoint, BeltProgram};
 use crate::scenario::{Scenario, SupportSpec};
 use crate::solver::{Curvature, Outcome, Solution, dependent_constraints};
-use crate::spine::{Piece, Spine};
-use crate::surface::fold;
 use nalgebra::Vector3;
 use std::ops::ControlFlow;
 
@@ -29,27 +27,23 @@ pub(super) fn solve(
 ) -> Equilibrium {
     let units = Units::of(belt);
     let assembly = Assembly::new(scenario, belt);
-    let program = assembly.program(scenario.elements());
-    let search = Search {
-        bulge: Vector3::from(scenario.solver.bulge),
-        tolerance: scenario.solver.tolerance,
-    };
-    let finer = scenario.elements() > scenario.default_elements();
-    let coarse = finer.then(|| assembly.program(scenario.default_elements()));
-    let excess = excess_distance(scenario, units.length);
-    let solution = match excess {
-        Some(_) => search.start(&program),
-        None => search.run(&program, coarse.as_ref(), proceed),
-    };
-    let crossing = program.least_slack(&solution.point) <= 0.0;
-    let said_twice = said_twice(scenario, &program, &search.bulge);
-    let (status, message) = match excess {
-        Some(message) => (Status::Infeasible, message),
-        None if crossing => (Status::NotConverged, CROSSING.to_owned()),
-        None => judge(&solution, search.tolerance, said_twice.as_deref()),
-    };
+    let (Found { program, solution }, status, message, doubts) =
+        match excess_distance(scenario, units.length) {
+            Some(message) => {
+                let found = start(scenario, &assembly);
+                (found, Status::Infeasible, message, Vec::new())
+            }
+            None => {
+                let (found, crossing) = find(scenario, &assembly, proceed);
+                let twice = said_twice(scenario, &found.program);
+                let (status, message) =
+                    judge(scenario, &found.solution, crossing, twice.as_deref());
+                (found, status, message, doubts(status, twice))
+            }
+        };
     let stable = stable(status, solution.curvature);
-    let spine = units.spine(&program, &solution.point, belt, &assembly.origin);
+    let spine = assembly.spine(&program, &solution.point);
+    let half_turns = half_turns(&spine);
     let internal = program.internal(&solution.point, &solution.multipliers);
     let links = program.link_forces(&solution.multipliers).into_iter();
     Equilibrium {
@@ -57,11 +51,11 @@ pub(super) fn solve(
         message,
         warnings: [
             warnings(scenario, &program, stable),
-            doubts(scenario, status, said_twice, half_turns(&spine)),
-            folds(&spine, status),
+            doubts,
+            passed_through_itself(scenario, half_turns),
         ]
         .concat(),
-        half_turns: half_turns(&spine),
+        half_turns,
         energy: solution.values.objective * units.energy + assembly.potential_of_origin(),
         elastic_energy: program.elastic_energy(&solution.point.fields) * units.energy,
         torsion: spine.torsion(),
@@ -81,10 +75,47 @@ pub(super) fn solve(
     }
 }
 
+/// Where a search ended, in its programme.
+struct Found {
+    program: BeltProgram,
+    solution: Solution<BeltPoint>,
+}
+
+impl Search {
+    fn of(scenario: &Scenario) -> Self {
+        Self {
+            bulge: Vector3::from(scenario.solver.bulge),
+            tolerance: scenario.solver.tolerance,
+        }
+    }
+}
+
+/// The start of a search that is known to find nothing.
+fn start(scenario: &Scenario, assembly: &Assembly) -> Found {
+    let program = assembly.program(scenario.elements());
+    let solution = Search::of(scenario).start(&program);
+    Found { program, solution }
+}
+
+/// Searches; with the arc length where ribs still cross on the board, if they do.
+fn find(
+    scenario: &Scenario,
+    assembly: &Assembly,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> (Found, Option<f64>) {
+    let search = Search::of(scenario);
+    let mut program = assembly.program(scenario.elements());
+    let finer = scenario.elements() > scenario.default_elements();
+    let coarse = finer.then(|| assembly.program(scenario.default_elements()));
+    let solution = search.run(&program, coarse.as_ref(), proceed);
+    let (solution, crossing) = keep_apart(assembly, &search, &mut program, solution, proceed);
+    (Found { program, solution }, crossing)
+}
+
 /// The supports and links that hold the same twice over, by name; `None` where all are independent.
 ///
 /// Two supports, one at either end of a belt that bends, always are.
-fn said_twice(scenario: &Scenario, program: &BeltProgram, bulge: &Vector3<f64>) -> Option<String> {
+fn said_twice(scenario: &Scenario, program: &BeltProgram) -> Option<String> {
     let rigid = program
         .pieces
         .iter()
@@ -94,7 +125,8 @@ fn said_twice(scenario: &Scenario, program: &BeltProgram, bulge: &Vector3<f64>) 
         return None;
     }
     // In general position: some constraints depend on each other on the straight belt and nowhere else.
-    let general = disturb(program, &guess(program, bulge), 0.3);
+    let bulge = Vector3::from(scenario.solver.bulge);
+    let general = disturb(program, &guess(program, &bulge), 0.3);
     let name = |i: usize| match i.checked_sub(program.supports.len()) {
         None if i < supports => Some(format!("supports[{i}]")),
         Some(link) if link < links => Some(format!("links[{link}]")),
@@ -107,10 +139,12 @@ fn said_twice(scenario: &Scenario, program: &BeltProgram, bulge: &Vector3<f64>) 
 
 /// Status and message of a search that was not infeasible from the outset.
 fn judge(
+    scenario: &Scenario,
     solution: &Solution<BeltPoint>,
-    tolerance: f64,
+    crossing: Option<f64>,
     said_twice: Option<&str>,
 ) -> (Status, String) {
+    let tolerance = scenario.solver.tolerance;
     if let (Some(names), false) = (said_twice, solution.outcome == Outcome::Converged) {
         return (
             Status::Infeasible,
@@ -122,6 +156,14 @@ fn judge(
     let largest = solution.residuals.largest();
     let (iterations, violation) = (solution.iterations, solution.residuals.constraint);
     match solution.outcome {
+        Outcome::Converged if let Some(u) = crossing => (
+            Status::NotConverged,
+            format!(
+                "ribs cross on the board at u = {}, beside a bend that they reach past; try another solver.bulge, a \
+                 narrower board or a gentler bend",
+                number(u)
+            ),
+        ),
         Outcome::Converged => (
             Status::Converged,
             format!("converged in {iterations} iterations, largest residual {largest:.1e}"),
@@ -154,6 +196,7 @@ fn judge(
                  try another solver.bulge or more solver.elements"
             ),
         ),
+        Outcome::Inadmissible => (Status::NotConverged, CROSSING.to_owned()),
         Outcome::Interrupted => (
             Status::NotConverged,
             format!("interrupted after {iterations} iterations, largest residual {largest:.1e}"),
@@ -161,36 +204,23 @@ fn judge(
     }
 }
 
-/// Says where the surface folds over itself beside a bend of the board.
-fn folds(spine: &Spine, status: Status) -> Vec<String> {
-    let fold = fold(spine).filter(|_| status == Status::Converged);
-    let said = fold.map(|u| {
-        format!(
-            "ribs cross near an edge at u = {}, beside a bend or an arc where steep ribs reach farther than V/2: no board \
-             can take that shape there; try another solver.bulge, a narrower board or a gentler bend",
-            number(u)
-        )
+/// What should be known of constraints that depend on each other before the reactions are relied on.
+fn doubts(status: Status, said_twice: Option<String>) -> Vec<String> {
+    let names = said_twice.filter(|_| status == Status::Converged);
+    let said = names.map(|names| {
+        format!("{names} hold the same twice over: what each of them bears is not determined")
     });
     said.into_iter().collect()
 }
 
-/// What should be known of constraints and turns before the result is relied on.
-fn doubts(
-    scenario: &Scenario,
-    status: Status,
-    said_twice: Option<String>,
-    half_turns: Option<i32>,
-) -> Vec<String> {
-    let said = said_twice
-        .filter(|_| status == Status::Converged)
-        .map(|names| {
-            format!("{names} hold the same twice over: what each of them bears is not determined")
-        });
+/// Says where a closed belt ended with another number of half turns than it was given.
+fn passed_through_itself(scenario: &Scenario, half_turns: Option<i32>) -> Vec<String> {
     let asked = scenario.belt.half_turns.unwrap_or(0);
-    let passed = half_turns.filter(|made| *made != asked).map(|made| {
+    let made = half_turns.filter(|made| *made != asked);
+    let said = made.map(|made| {
         format!("the belt has passed through itself: it was given {asked} half turns and ended with {made}")
     });
-    said.into_iter().chain(passed).collect()
+    said.into_iter().collect()
 }
 
 fn warnings(scenario: &Scenario, program: &BeltProgram, stable: Option<bool>) -> Vec<String> {
@@ -271,36 +301,6 @@ impl Units {
         Wrench {
             force: force * self.force(),
             moment: moment * self.energy,
-        }
-    }
-
-    fn spine(
-        &self,
-        program: &BeltProgram,
-        point: &BeltPoint,
-        belt: &Belt,
-        origin: &Vector3<f64>,
-    ) -> Spine {
-        let pose = |pose: &Pose| Pose {
-            frame: pose.frame,
-            position: origin + pose.position * self.length,
-        };
-        let piece = |piece: &program::Piece| match piece {
-            program::Piece::Strip(element) => Piece::Strip {
-                geodesic: element.geodesic / self.length,
-            },
-            program::Piece::Rigid { .. } => Piece::Rigid,
-            program::Piece::Joint { angle } => Piece::Joint { angle: *angle },
-        };
-        let nodes = program.nodes();
-        Spine {
-            width: belt.width,
-            pieces: program.pieces.iter().map(piece).collect(),
-            half_turns: belt.half_turns,
-            u: nodes.iter().map(|u| u * self.length).collect(),
-            pose: point.poses.iter().map(pose).collect(),
-            bend: point.fields.iter().map(|f| f[0] / self.length).collect(),
-            rib_slope: point.fields.iter().map(|f| f[1]).collect(),
         }
     }
 }

@@ -68,6 +68,22 @@ impl Search {
         better(refined, |_| self.cold(program, proceed))
     }
 
+    /// Goes on from the minimum of a programme nearby; anew where that leads to none.
+    pub(super) fn again(
+        &self,
+        program: &BeltProgram,
+        found: Solution<BeltPoint>,
+        proceed: &mut Proceed,
+    ) -> Solution<BeltPoint> {
+        let near = self
+            .minimise(program, inside(program, found.point), WARM, proceed)
+            .after(found.iterations);
+        if is_done(&near) {
+            return near;
+        }
+        better(near, |_| self.cold(program, proceed))
+    }
+
     /// Searches from the guess, then from other starts, until a minimum is found; the best that was found otherwise.
     fn cold(&self, program: &BeltProgram, proceed: &mut Proceed) -> Solution<BeltPoint> {
         let start = match program.half_turns {

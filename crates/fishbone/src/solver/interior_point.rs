@@ -35,6 +35,7 @@ struct State<'a, P: Program> {
     barrier: f64,
     iteration: usize,
     interrupted: bool,
+    admissible: bool,
     linear: Linearisation,
     newton: Newton,
     filter: Filter,
@@ -60,7 +61,7 @@ impl<'a, P: Program> State<'a, P> {
         let linear = Linearisation::new(program);
         let newton = Newton::new(&linear, program.linked_nodes(), &weights);
         let mut values = Values::default();
-        program.evaluate(&mut point, &mut values);
+        let admissible = program.evaluate(&mut point, &mut values);
         let rows = vec![Rows::zeros(); linear.constraints.len() + linear.links.len()];
         let bounds = vec![[0.0; BOUNDS]; weights.len()];
         let mut state = Self {
@@ -76,6 +77,7 @@ impl<'a, P: Program> State<'a, P> {
             barrier: settings.barrier,
             iteration: 0,
             interrupted: false,
+            admissible,
             gradient: linear.gradient.clone(),
             plain_step: linear.gradient.clone(),
             linear,
@@ -91,6 +93,9 @@ impl<'a, P: Program> State<'a, P> {
     }
 
     fn iterate(&mut self, proceed: &mut dyn FnMut() -> ControlFlow<()>) -> Outcome {
+        if !self.admissible {
+            return Outcome::Inadmissible;
+        }
         loop {
             if self.residuals(0.0).largest() <= self.settings.tolerance {
                 return Outcome::Converged;
@@ -516,7 +521,7 @@ mod tests {
                 ride.position[k + 1] = ride.position[k] + SHARE * mean;
                 values.objective += 0.5 * SHARE * (mean * mean + ride.push[k][1].powi(2));
                 let rate = self.rate(ride, k);
-                values.slacks.push([1.0 - rate, 1.0 + rate]);
+                values.slacks.push([1.0 - rate, 1.0 + rate, 1.0, 1.0, 1.0]);
             }
             let mut held = vec![Rows::zeros(); 2];
             held[0][0] = ride.position[0];
@@ -561,7 +566,8 @@ mod tests {
                 add_controls(&mut into.gradient, k, &pull);
                 into.gradient[k][7] += SHARE * ride.push[k][1];
                 let by_rate = Vector4::new(-1.0, 0.0, 1.0, 0.0) / SHARE / self.steepest;
-                into.slacks[k] = [-by_rate, by_rate];
+                let none = Vector4::zeros();
+                into.slacks[k] = [-by_rate, by_rate, none, none, none];
             }
             into.gradient[0][0] = beyond + pulls(0) + multipliers[0][0];
             into.gradient[0][6] += multipliers[0][1];

@@ -20,8 +20,8 @@ use nalgebra::{Matrix6, SMatrix, SVector, Vector4};
 
 /// Most equality constraints at one node, or between one pair of nodes.
 pub const ROWS: usize = 6;
-/// Inequalities at one stage.
-pub const BOUNDS: usize = 2;
+/// Most inequalities at one stage; unused ones are 1 everywhere.
+pub const BOUNDS: usize = 5;
 
 /// Values or multipliers of the constraints of one node or pair; unused rows are zero.
 pub type Rows = SVector<f64, ROWS>;
@@ -123,6 +123,8 @@ pub enum Outcome {
     Stalled,
     /// The objective is not bounded below, or not finite.
     Unbounded,
+    /// The start is outside the domain.
+    Inadmissible,
     /// The caller asked to end.
     Interrupted,
 }

@@ -132,6 +132,20 @@ impl Board {
         Some(outwards.dot(&(end.flat - point)))
     }
 
+    /// The edges of a side behind the one beside a foot, that one if it is there, and those ahead of it; without the
+    /// lines across the ends of the board.
+    pub(super) fn edges_beside(&self, side: usize, foot: &Foot) -> [&[Edge]; 3] {
+        let chain = self.chains.edges[side].as_slice();
+        let ends = usize::from(self.chains.is_open);
+        let (own, is_there) = nearest_piece(&self.chains, side, foot);
+        let ahead = own + usize::from(is_there);
+        [
+            &chain[ends..own],
+            &chain[own..ahead],
+            &chain[ahead..chain.len() - ends],
+        ]
+    }
+
     /// Chain vertices strictly between two places, by their place and position.
     pub(super) fn vertices_between(
         &self,

@@ -2,7 +2,7 @@
 
 use super::board::Board;
 use super::curvature::{bend_radius, curvature};
-use super::rib::{Rib, rib_convergence, rib_convergence_bound, ribs};
+use super::rib::{rib_convergence, rib_convergence_bound};
 use crate::spine::{Piece, Spine, SpinePoint};
 use nalgebra::Vector3;
 
@@ -150,7 +150,7 @@ fn smooth_parts(spine: &Spine, board: &Board, element: usize) -> Vec<Part> {
 }
 
 /// The flexible elements: neither joints, which have no length, nor stiffeners, which have no ribs.
-fn strips(spine: &Spine) -> impl Iterator<Item = usize> {
+pub(super) fn strips(spine: &Spine) -> impl Iterator<Item = usize> {
     (0..spine.elements()).filter(|&element| {
         matches!(spine.pieces[element], Piece::Strip { .. }) && spine.element_length(element) > 0.0
     })
@@ -164,7 +164,7 @@ fn convergence(spine: &Spine, element: usize, rib_slope: f64) -> f64 {
 }
 
 /// s in the middle of an element.
-fn mean_convergence(spine: &Spine, element: usize) -> f64 {
+pub(super) fn mean_convergence(spine: &Spine, element: usize) -> f64 {
     let mean = 0.5 * (spine.rib_slope[element] + spine.rib_slope[element + 1]);
     convergence(spine, element, mean)
 }
@@ -236,26 +236,6 @@ pub fn rib_margin(spine: &Spine) -> RibMargin {
     };
     let narrower = |a: RibMargin, b: RibMargin| if b.value < a.value { b } else { a };
     strips(spine).map(margin).fold(start, narrower)
-}
-
-/// Arc length where neighbouring ribs cross inside the board although they do not within V/2 of the spine; `None` where
-/// none do.
-///
-/// Beside a bend or a tight arc a steep rib leaves the board far beyond V/2.
-pub fn fold(spine: &Spine) -> Option<f64> {
-    /// What rounding and the length of the elements may do to ribs that just touch.
-    const CLEARLY: f64 = 1.05;
-    let bends = |piece: &Piece| piece.geodesic() != 0.0 || piece.corner() != 0.0;
-    if !spine.pieces.iter().any(bends) {
-        return None;
-    }
-    let ribs = ribs(spine);
-    let crosses = |element: &usize| {
-        let s = mean_convergence(spine, *element);
-        let reach = |rib: &Rib| (s * rib.v_plus).max(s * rib.v_minus);
-        reach(&ribs[*element]).max(reach(&ribs[element + 1])) > CLEARLY
-    };
-    strips(spine).find(crosses).map(|element| spine.u[element])
 }
 
 #[cfg(test)]

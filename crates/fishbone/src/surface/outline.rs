@@ -123,10 +123,15 @@ impl Edge {
         }
     }
 
+    /// Its direction at a fraction of its length, as an angle from the y axis.
+    pub(super) fn direction(&self, fraction: f64) -> f64 {
+        self.heading + fraction * self.curve.turn()
+    }
+
     fn part(&self, from: f64, to: f64) -> Self {
         Self {
             curve: self.curve.part(from, to),
-            heading: self.heading + from * self.curve.turn(),
+            heading: self.direction(from),
             owner: self.owner,
         }
     }
