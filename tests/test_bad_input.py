@@ -14,7 +14,6 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,13 +21,12 @@ from typing import Any
 import pytest
 
 import fishbone as fb
+from changes import Change, drop, put, rename, several
 from helpers import Json, clamped, example1, solve_any
 
 HUGE_FILE = 100_000_000
 HUGE_FILE_SECONDS = 5.0
 HUGE_FILE_MEMORY = 30_000_000
-
-Change = Callable[[Json], None]
 
 
 @dataclass(frozen=True)
@@ -42,53 +40,6 @@ class Case:
 
 def good() -> Json:
     return example1("wunderlich", elements=80)
-
-
-def put(path: str, value: Any) -> Change:
-    """Sets a field; numbers in the path are list indices."""
-
-    def change(scenario: Json) -> None:
-        *parents, last = [int(key) if key.isdigit() else key for key in path.split(".")]
-        table: Any = scenario
-        for key in parents:
-            table = table.setdefault(key, {}) if isinstance(table, dict) else table[key]
-        table[last] = value
-
-    return change
-
-
-def rename(path: str, new: str) -> Change:
-    """Misspells a key."""
-
-    def change(scenario: Json) -> None:
-        *parents, last = [int(key) if key.isdigit() else key for key in path.split(".")]
-        table: Any = scenario
-        for key in parents:
-            table = table[key]
-        table[new] = table.pop(last)
-
-    return change
-
-
-def drop(path: str) -> Change:
-    """Leaves a field out."""
-
-    def change(scenario: Json) -> None:
-        *parents, last = [int(key) if key.isdigit() else key for key in path.split(".")]
-        table: Any = scenario
-        for key in parents:
-            table = table[key]
-        del table[last]
-
-    return change
-
-
-def both(*changes: Change) -> Change:
-    def change(scenario: Json) -> None:
-        for one in changes:
-            one(scenario)
-
-    return change
 
 
 def reverse_supports(scenario: Json) -> None:
@@ -169,7 +120,7 @@ NUMBERS = (
 
 
 def quaternion(values: list[float]) -> Change:
-    return both(drop("supports.1.rotation"), put("supports.1.quaternion", values))
+    return several(drop("supports.1.rotation"), put("supports.1.quaternion", values))
 
 
 ORIENTATIONS = (
@@ -221,7 +172,7 @@ BOARDS = (
     Case("end of a closed belt", CLOSED, ("supports[1].at", "start")),
     Case(
         "unknown material",
-        both(drop("belt.rigidity"), put("belt.material", {"preset": "polyimid", "thickness": 25e-6})),
+        several(drop("belt.rigidity"), put("belt.material", {"preset": "polyimid", "thickness": 25e-6})),
         ("preset", "polyimid", "polyimide", "FR-4"),
     ),
 )
@@ -239,7 +190,7 @@ OUTSIDE = (
     ),
     Case(
         "hinge without an orientation",
-        both(drop("supports.1.rotation"), put("supports.1.hinge", "zeta")),
+        several(drop("supports.1.rotation"), put("supports.1.hinge", "zeta")),
         ("hinge", "orientation"),
     ),
 )

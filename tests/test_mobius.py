@@ -15,6 +15,7 @@ import pytest
 import fishbone as fb
 from helpers import (
     ENERGIES,
+    ORIGIN,
     Array,
     Energy,
     Json,
@@ -25,6 +26,7 @@ from helpers import (
     result,
     rotation_vector,
     solve,
+    solve_any,
     straight,
     support,
 )
@@ -199,3 +201,12 @@ def test_ring_can_be_pulled_by_its_supports() -> None:
     assert pulled.energy > 1.05 * ring.energy
     assert float(forces[1] @ opposite) > 1e-3
     assert np.max(np.abs(forces[0] + forces[1])) < 1e-6
+
+
+def test_links_of_a_closed_belt_may_reach_across_the_seam() -> None:
+    """The belt between two points is the shorter way round: 0.2 U here, not 0.8 U; more is refused."""
+    for share, status in [(0.15, "converged"), (0.21, "infeasible")]:
+        link: Json = {"from": 0.1 * LENGTH, "to": 0.9 * LENGTH, "offset": [0.0, -share * LENGTH, 0.0]}
+        scenario = closed(0, [support("start", ORIGIN, ORIGIN, square_rib=False)], elements=100)
+        scenario["links"] = [link]
+        assert solve_any(scenario).status == status

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
 
 import fishbone as fb
+from changes import Change, drop, put, several
 from helpers import (
     ORIGIN,
     Json,
@@ -35,7 +35,6 @@ ELEMENTS = 80
 NAN = math.nan
 START, END = support("start", ORIGIN, ORIGIN), support("end", (0.06, 0.62, 0.08), (0.3, 0.2, -0.25))
 SHEET = {"young": 3.2e9, "poisson": 0.34, "thickness": 140e-6, "density": 1050.0}
-Change = Callable[[Json], None]
 
 
 def base() -> Json:
@@ -53,45 +52,11 @@ def small(board_fields: Json, **loads: Any) -> Json:
     return scenario
 
 
-def put(path: str, value: Any) -> Change:
-    """Sets a field; numbers in the path are list indices."""
-
-    def change(scenario: Json) -> None:
-        *parents, last = [int(key) if key.isdigit() else key for key in path.split(".")]
-        table: Any = scenario
-        for key in parents:
-            table = table.setdefault(key, {}) if isinstance(table, dict) else table[key]
-        table[last] = value
-
-    return change
-
-
-def drop(path: str) -> Change:
-    """Leaves a field out."""
-
-    def change(scenario: Json) -> None:
-        *parents, last = [int(key) if key.isdigit() else key for key in path.split(".")]
-        table: Any = scenario
-        for key in parents:
-            table = table[key]
-        del table[last]
-
-    return change
-
-
 def inner(**fields: Any) -> Change:
     """A support in the middle."""
 
     def change(scenario: Json) -> None:
         scenario["supports"].insert(1, {"at": 0.5, **fields})
-
-    return change
-
-
-def several(*changes: Change) -> Change:
-    def change(scenario: Json) -> None:
-        for one in changes:
-            one(scenario)
 
     return change
 

@@ -204,14 +204,13 @@ impl Belt {
         }
     }
 
-    /// About `count` elements, shared out by length with at least one between two breaks or ends of segments; lengths in
-    /// U, rigidity in its mean. A stiffened stretch is one piece.
+    /// `count` elements shared out by length, a few more where that takes parts of one between two breaks or ends of
+    /// segments; lengths in U, rigidity in its mean. A stiffened stretch is one piece.
     pub fn pieces(&self, count: usize, breaks: &[Break]) -> Vec<Piece> {
         let length = self.length();
-        let stretches = self.stretches(breaks);
-        let shares = share_out(count, stretches.iter().map(|s| (s.to - s.from) / length));
         let mut pieces = Vec::new();
-        for (stretch, share) in stretches.iter().zip(shares) {
+        for stretch in &self.stretches(breaks) {
+            let share = share(count, (stretch.to - stretch.from) / length);
             pieces.extend(stretch.joint);
             match stretch.segment {
                 Segment::Strip(strip) => pieces.extend(self.elements(strip, stretch, share)),
@@ -284,19 +283,11 @@ impl Belt {
     }
 }
 
-/// Shares a count out by weight, which sum to 1: at each boundary the share so far is the nearest whole number, and at
-/// least one each.
-fn share_out(count: usize, weights: impl Iterator<Item = f64>) -> Vec<usize> {
-    let (mut sum, mut given) = (0.0, 0);
-    weights
-        .map(|weight| {
-            sum += weight;
-            let due = (sum * count as f64).round() as usize;
-            let share = due.saturating_sub(given).max(1);
-            given += share;
-            share
-        })
-        .collect()
+/// The share of a count by weight, out of 1, rounded up: no element is longer than if all were alike.
+fn share(count: usize, weight: f64) -> usize {
+    const ROUNDING: f64 = 1e-9;
+    let due = weight * count as f64;
+    ((due - ROUNDING).ceil() as usize).max(1)
 }
 
 #[cfg(test)]
@@ -333,8 +324,9 @@ mod tests {
 
     #[test]
     fn test_elements_are_shared_out_by_length() {
-        assert_eq!(share_out(10, [0.25, 0.25, 0.5].into_iter()), [3, 2, 5]);
-        assert_eq!(share_out(4, [0.999, 0.0005, 0.0005].into_iter()), [4, 1, 1]);
+        assert_eq!([0.25, 0.26, 0.5].map(|weight| share(10, weight)), [3, 3, 5]);
+        assert_eq!([0.999, 1e-12].map(|weight| share(4, weight)), [4, 1]);
+        assert_eq!(share(80, 0.1 + 0.2), 24);
     }
 
     #[test]

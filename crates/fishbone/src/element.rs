@@ -7,7 +7,7 @@ use crate::energy::{Curl, EnergyModel, Term};
 use crate::lie::{Coefficients, Pose, Twist, gauss_points, hat, magnus};
 use crate::solver::BOUNDS;
 use crate::strip::{Across, Edge, FURTHER, SlopeJet, Strips};
-use nalgebra::{Matrix2x4, Matrix3, Matrix3x4, Matrix4, Vector3, Vector4};
+use nalgebra::{Matrix2, Matrix2x4, Matrix3, Matrix3x4, Matrix4, Vector3, Vector4};
 
 /// Torsion ω_η = −β ω_ζ.
 ///
@@ -92,16 +92,7 @@ impl Jet {
 
     /// Adds a term of the density at parameter t of the element.
     fn add_term(&mut self, weight: f64, term: &Term, t: f64) {
-        let inputs = Matrix2x4::new(
-            1.0 - t,
-            0.0,
-            t,
-            0.0, //
-            0.0,
-            1.0 - t,
-            0.0,
-            t,
-        );
+        let inputs = fields_by_nodes(t);
         self.value += weight * term.value;
         self.gradient += weight * inputs.tr_mul(&term.gradient);
         self.hessian += weight * inputs.tr_mul(&(term.hessian * inputs));
@@ -155,25 +146,11 @@ impl GaussFields {
 
     /// Derivative of (bend₁, slope₁, bend₂, slope₂) at the Gauss points by the nodal unknowns.
     fn by_nodes() -> Matrix4<f64> {
-        let [t, s] = gauss_points();
-        Matrix4::new(
-            1.0 - t,
-            0.0,
-            t,
-            0.0, //
-            0.0,
-            1.0 - t,
-            0.0,
-            t, //
-            1.0 - s,
-            0.0,
-            s,
-            0.0, //
-            0.0,
-            1.0 - s,
-            0.0,
-            s,
-        )
+        let [first, second] = gauss_points().map(fields_by_nodes);
+        let mut both = Matrix4::zeros();
+        both.fixed_rows_mut::<2>(0).copy_from(&first);
+        both.fixed_rows_mut::<2>(2).copy_from(&second);
+        both
     }
 
     /// Twists per unit length at the two Gauss points.
@@ -374,6 +351,12 @@ impl Element {
         derivative[(0, 2)] = weight;
         derivative
     }
+}
+
+/// Derivative of (bend, slope) at parameter t of an element by the nodal unknowns.
+fn fields_by_nodes(t: f64) -> Matrix2x4<f64> {
+    let (own, next) = (Matrix2::identity() * (1.0 - t), Matrix2::identity() * t);
+    Matrix2x4::from_columns(&[own.column(0), own.column(1), next.column(0), next.column(1)])
 }
 
 /// V(φ) a, with the left Jacobian V of SO(3).

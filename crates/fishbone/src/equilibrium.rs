@@ -7,7 +7,7 @@ mod ritz;
 mod search;
 
 use crate::belt::Belt;
-use crate::scenario::{LinkSpec, Method, Scenario, SupportSpec};
+use crate::scenario::{BeltSpec, LinkSpec, Method, Scenario, SupportSpec};
 use crate::solver::Residuals;
 use crate::spine::Spine;
 use nalgebra::Vector3;
@@ -129,12 +129,15 @@ pub fn solve(scenario: &Scenario, proceed: &mut dyn FnMut() -> ControlFlow<()>) 
 struct Span {
     u: [f64; 2],
     distance: f64,
+    /// The belt between them.
+    belt: f64,
     /// What rounding may do to the distance.
     rounding: f64,
 }
 
 impl Span {
-    fn between(pair: &[SupportSpec], length: f64) -> Self {
+    fn between(pair: &[SupportSpec], belt: &BeltSpec) -> Self {
+        let length = belt.length();
         let [x, x_next] = [0, 1].map(|i| pair[i].components());
         let held = (0..3).filter_map(|i| x[i].zip(x_next[i]));
         let (square, size) = held.fold((0.0, 0.0), |(square, size), (a, b)| {
@@ -143,26 +146,39 @@ impl Span {
                 f64::max(size, a.abs().max(b.abs())),
             )
         });
+        let u = [0, 1].map(|i| pair[i].at.arc_length(length));
         Self {
-            u: [0, 1].map(|i| pair[i].at.arc_length(length)),
+            u,
             distance: f64::sqrt(square),
+            belt: belt_between(u, belt),
             rounding: 1e-12 * length + 4.0 * f64::EPSILON * size,
         }
     }
 
+    /// The supports of a scenario, each with the next.
+    fn all(scenario: &Scenario) -> impl Iterator<Item = Self> {
+        let pairs = scenario.supports.windows(2);
+        pairs.map(|pair| Self::between(pair, &scenario.belt))
+    }
+
     /// By how much the distance exceeds the belt in between.
     fn excess(&self) -> f64 {
-        self.distance - (self.u[1] - self.u[0])
+        self.distance - self.belt
+    }
+}
+
+/// Length of belt between two points, of a closed one the shorter way round.
+fn belt_between(u: [f64; 2], belt: &BeltSpec) -> f64 {
+    let way = (u[1] - u[0]).abs();
+    match belt.closed {
+        true => way.min(belt.length() - way),
+        false => way,
     }
 }
 
 /// Says by how much two supports, or the ends of a link, are too far apart for the belt between them, where they are.
-fn excess_distance(scenario: &Scenario, length: f64) -> Option<String> {
-    let mut spans = scenario
-        .supports
-        .windows(2)
-        .map(|pair| Span::between(pair, length))
-        .enumerate();
+fn excess_distance(scenario: &Scenario) -> Option<String> {
+    let mut spans = Span::all(scenario).enumerate();
     if let Some((i, span)) = spans.find(|(_, span)| span.excess() > span.rounding) {
         return Some(format!(
             "supports[{i}] and supports[{}], at u = {} and u = {}, are {} apart, {} more than the belt between them ({}); \
@@ -172,24 +188,22 @@ fn excess_distance(scenario: &Scenario, length: f64) -> Option<String> {
             number(span.u[1]),
             number(span.distance),
             number(span.excess()),
-            number(span.u[1] - span.u[0])
+            number(span.belt)
         ));
     }
-    let links = scenario.links.iter().enumerate();
-    links
-        .filter_map(|(i, link)| too_long(i, link, length))
-        .next()
+    let mut links = scenario.links.iter().enumerate();
+    links.find_map(|(i, link)| too_long(i, link, &scenario.belt))
 }
 
 /// Says that a link asks for more distance than there is belt between its ends, where it does.
-fn too_long(i: usize, link: &LinkSpec, length: f64) -> Option<String> {
-    let [from, to] = [link.from, link.to].map(|place| place.arc_length(length));
-    let (between, distance) = ((to - from).abs(), Vector3::from(link.offset).norm());
+fn too_long(i: usize, link: &LinkSpec, belt: &BeltSpec) -> Option<String> {
+    let u = [link.from, link.to].map(|place| place.arc_length(belt.length()));
+    let (between, distance) = (belt_between(u, belt), Vector3::from(link.offset).norm());
     (distance > between * (1.0 + 1e-12)).then(|| {
         format!(
             "links[{i}] holds u = {} and u = {} at a distance of {}, {} more than the belt between them; shorten its offset",
-            number(from),
-            number(to),
+            number(u[0]),
+            number(u[1]),
             number(distance),
             number(distance - between)
         )
@@ -197,13 +211,9 @@ fn too_long(i: usize, link: &LinkSpec, length: f64) -> Option<String> {
 }
 
 /// Whether two supports leave the belt between them so little slack that its reactions are not determined.
-fn is_taut(scenario: &Scenario, length: f64) -> bool {
+fn is_taut(scenario: &Scenario) -> bool {
     const SLACK: f64 = 1e-6;
-    let mut spans = scenario
-        .supports
-        .windows(2)
-        .map(|pair| Span::between(pair, length));
-    spans.any(|span| span.excess() > -SLACK * (span.u[1] - span.u[0]))
+    Span::all(scenario).any(|span| span.excess() > -SLACK * span.belt)
 }
 
 /// A number for people, six decimals or the exponent that it needs.

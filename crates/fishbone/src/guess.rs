@@ -220,8 +220,7 @@ impl Headings {
     fn slopes(&self, reach: f64) -> Vec<f64> {
         const SHORTEST: f64 = 1e-6;
         let slope = |(u, heading): (&f64, &f64)| {
-            let free = self.held.iter().map(|held| (held - u).abs());
-            let reach = free.fold(reach.max(SHORTEST), f64::min);
+            let reach = reach.max(SHORTEST).min(self.to_held(*u));
             let mean = (self.integral_at(u + reach) - self.integral_at(u - reach)) / (2.0 * reach);
             match reach < SHORTEST {
                 true => 0.0,
@@ -229,6 +228,12 @@ impl Headings {
             }
         };
         self.u.iter().zip(&self.heading).map(slope).collect()
+    }
+
+    /// Way to the nearest held rib.
+    fn to_held(&self, u: f64) -> f64 {
+        let ways = self.held.iter().map(|held| (held - u).abs());
+        ways.fold(f64::INFINITY, f64::min)
     }
 
     /// Integral of the heading from the start, going on straight beyond the ends.
@@ -285,18 +290,13 @@ pub(crate) fn buckle(
     let side = -point.poses[0].frame.column(0).dot(bulge).signum();
     let mut buckled = point.clone();
     let calm = calm_slopes(program);
-    let nodes = program.nodes();
-    let held: Vec<f64> = (0..nodes.len())
-        .filter(|node| program.fixed_slope(*node).is_some())
-        .map(|node| nodes[node])
-        .collect();
+    let board = Headings::of(program);
     let steepest = program
         .elements()
         .map(|(_, element)| 0.5 / element.half_width)
         .fold(f64::INFINITY, f64::min);
-    for ((fields, calm), u) in buckled.fields.iter_mut().zip(calm).zip(&nodes) {
-        let free = held.iter().map(|held| (held - u).abs());
-        let most = free.fold(f64::INFINITY, f64::min) * steepest;
+    for ((fields, calm), u) in buckled.fields.iter_mut().zip(calm).zip(&board.u) {
+        let most = board.to_held(*u) * steepest;
         *fields = Vector2::new(side * BEND * (1.0 - u), calm + slope.clamp(-most, most));
     }
     inside(program, buckled)

@@ -27,20 +27,18 @@ pub(super) fn solve(
 ) -> Equilibrium {
     let units = Units::of(belt);
     let assembly = Assembly::new(scenario, belt);
-    let (Found { program, solution }, status, message, doubts) =
-        match excess_distance(scenario, units.length) {
-            Some(message) => {
-                let found = start(scenario, &assembly);
-                (found, Status::Infeasible, message, Vec::new())
-            }
-            None => {
-                let (found, crossing) = find(scenario, &assembly, proceed);
-                let twice = said_twice(scenario, &found.program);
-                let (status, message) =
-                    judge(scenario, &found.solution, crossing, twice.as_deref());
-                (found, status, message, doubts(status, twice))
-            }
-        };
+    let (Found { program, solution }, status, message, doubts) = match excess_distance(scenario) {
+        Some(message) => {
+            let found = start(scenario, &assembly);
+            (found, Status::Infeasible, message, Vec::new())
+        }
+        None => {
+            let (found, crossing) = find(scenario, &assembly, proceed);
+            let twice = said_twice(scenario, &found.program);
+            let (status, message) = judge(scenario, &found.solution, crossing, twice.as_deref());
+            (found, status, message, doubts(status, twice))
+        }
+    };
     let stable = stable(status, solution.curvature);
     let spine = assembly.spine(&program, &solution.point);
     let half_turns = half_turns(&spine);
@@ -231,7 +229,7 @@ fn warnings(scenario: &Scenario, program: &BeltProgram, stable: Option<bool>) ->
         .map(|(_, e)| e.length / (2.0 * e.half_width));
     let longest = shares.fold(0.0, f64::max);
     let coarse = longest * SAFE > 1.0 + 1e-9;
-    let taut = is_taut(scenario, scenario.belt.length());
+    let taut = is_taut(scenario);
     let weightless = scenario.loads.gravity.is_some_and(|g| g != [0.0; 3])
         && scenario.belt.density_value() == 0.0;
     let saddle = stable == Some(false);
@@ -244,7 +242,7 @@ fn warnings(scenario: &Scenario, program: &BeltProgram, stable: Option<bool>) ->
         coarse.then(|| {
             format!(
                 "elements of {longest:.2} V may settle on a false level: V/8 is safe, so raise solver.elements to {:.0}",
-                (SAFE * longest * program.elements().count() as f64).ceil()
+                (SAFE * scenario.belt.length() / scenario.belt.width).ceil()
             )
         }),
         taut.then(|| {

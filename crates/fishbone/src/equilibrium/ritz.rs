@@ -71,7 +71,7 @@ fn report(scenario: &Scenario, belt: &Belt, start: &Pose, solution: &Solution) -
     };
     let rate = |i: usize| u.iter().map(move |u| solution.rates(*u)[i] / units.length);
     let energy = solution.energy * units.energy;
-    let (status, message) = match excess_distance(scenario, units.length) {
+    let (status, message) = match excess_distance(scenario) {
         Some(message) => (Status::Infeasible, message),
         None => (Status::NotConverged, message(solution)),
     };

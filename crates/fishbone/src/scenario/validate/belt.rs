@@ -5,7 +5,8 @@ use super::super::{
     BeltSpec, LayerSpec, MaterialSpec, Rigidity, RigidityTable, SAME_PLACE, SegmentSpec,
 };
 use super::check::{
-    Check, MAGNITUDES, at_most, between, finite, measurable, not_negative, positive, require, span,
+    Check, MAGNITUDES, at_most, between, finite, given, measurable, not_negative, positive,
+    require, span,
 };
 use crate::material::{Material, PRESETS};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, TAU};
@@ -176,14 +177,11 @@ impl BeltSpec {
     }
 
     fn check_rigidity_sources(&self) -> Check {
-        let sources: Vec<&str> = [
+        let sources = given(&[
             ("rigidity", self.rigidity.is_some()),
             ("material", self.material.is_some()),
             ("layers", self.layers.is_some()),
-        ]
-        .iter()
-        .filter_map(|(name, given)| given.then_some(*name))
-        .collect();
+        ]);
         let needed = self
             .segments
             .iter()

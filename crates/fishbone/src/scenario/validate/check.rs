@@ -30,6 +30,12 @@ pub(super) fn require<F: Display, A: Display>(
     ))
 }
 
+/// The names of what is given.
+pub(super) fn given<'a>(fields: &[(&'a str, bool)]) -> Vec<&'a str> {
+    let given = fields.iter().filter(|(_, is_given)| *is_given);
+    given.map(|(name, _)| *name).collect()
+}
+
 pub(super) fn between<T: Display>(range: &RangeInclusive<T>) -> String {
     format!("from {} to {}", range.start(), range.end())
 }

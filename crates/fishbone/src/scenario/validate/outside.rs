@@ -2,7 +2,9 @@
 
 use super::super::node::number;
 use super::super::{LinkSpec, LoadsSpec, Place, SAME_PLACE, SupportSpec};
-use super::check::{Check, at_most, bounded_vector, finite_vector, near, near_vector, require};
+use super::check::{
+    Check, at_most, bounded_vector, finite_vector, given, near, near_vector, require,
+};
 use nalgebra::Vector4;
 use std::fmt::Arguments;
 
@@ -84,14 +86,11 @@ impl SupportSpec {
     }
 
     fn check_orientation(&self, i: usize) -> Check {
-        let given: Vec<&str> = [
+        let given = given(&[
             ("rotation", self.rotation.is_some()),
             ("euler", self.euler.is_some()),
             ("quaternion", self.quaternion.is_some()),
-        ]
-        .iter()
-        .filter_map(|(name, given)| given.then_some(*name))
-        .collect();
+        ]);
         require(given.len() <= 1, format_args!("supports[{i}]"), || {
             (given.join(" and "), format!("given {ORIENTATIONS}"))
         })?;
