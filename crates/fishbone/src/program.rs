@@ -18,6 +18,7 @@ use crate::lie::{Pose, hat};
 use crate::solver::chain::{NodeVector, Stage};
 use crate::solver::{BOUNDS, Bounds, Linearisation, Program, Rows, Values};
 use crate::spine::turn;
+use crate::strip::FURTHER;
 use nalgebra::{Matrix3, Matrix4, Rotation3, UnitQuaternion, Vector2, Vector3, Vector4};
 
 /// What joins a node to the next.
@@ -429,6 +430,14 @@ impl Program for BeltProgram {
 
     fn linked_nodes(&self) -> Vec<[usize; 2]> {
         self.links.iter().map(|link| link.nodes).collect()
+    }
+
+    fn bounds(&self) -> usize {
+        let mut elements = self.elements();
+        match elements.any(|(_, element)| element.further != [None; FURTHER]) {
+            true => BOUNDS,
+            false => BOUNDS - FURTHER,
+        }
     }
 
     fn weights(&self) -> Vec<f64> {

@@ -28,6 +28,8 @@ struct State<'a, P: Program> {
     program: &'a P,
     settings: Settings,
     weights: Vec<f64>,
+    /// Inequalities in use at every stage.
+    bounds: usize,
     point: P::Point,
     values: Values,
     multipliers: Vec<Rows>,
@@ -59,7 +61,7 @@ impl<'a, P: Program> State<'a, P> {
     fn new(program: &'a P, settings: Settings, mut point: P::Point) -> Self {
         let weights = program.weights();
         let linear = Linearisation::new(program);
-        let newton = Newton::new(&linear, program.linked_nodes(), &weights);
+        let newton = Newton::new(&linear, program.linked_nodes(), &weights, program.bounds());
         let mut values = Values::default();
         let admissible = program.evaluate(&mut point, &mut values);
         let rows = vec![Rows::zeros(); linear.constraints.len() + linear.links.len()];
@@ -67,6 +69,7 @@ impl<'a, P: Program> State<'a, P> {
         let mut state = Self {
             program,
             settings,
+            bounds: program.bounds(),
             filter: Filter::new(violation(&values)),
             trial: point.clone(),
             trial_values: values.clone(),
@@ -177,7 +180,7 @@ impl<'a, P: Program> State<'a, P> {
         self.gradient.copy_from_slice(&self.linear.gradient);
         let mut complementarity = 0.0;
         for (k, multipliers) in self.bound_multipliers.iter().enumerate() {
-            for (b, multiplier) in multipliers.iter().enumerate() {
+            for (b, multiplier) in multipliers.iter().enumerate().take(self.bounds) {
                 add_controls(
                     &mut self.gradient,
                     k,
@@ -220,7 +223,7 @@ impl<'a, P: Program> State<'a, P> {
         self.gradient.copy_from_slice(&self.linear.gradient);
         for (k, slacks) in self.values.slacks.iter().enumerate() {
             let push = self.barrier * self.weights[k];
-            for (b, slack) in slacks.iter().enumerate() {
+            for (b, slack) in slacks.iter().enumerate().take(self.bounds) {
                 add_controls(
                     &mut self.gradient,
                     k,
@@ -247,7 +250,10 @@ impl<'a, P: Program> State<'a, P> {
             .slacks
             .iter()
             .zip(&self.weights)
-            .map(|(slacks, weight)| weight * slacks.iter().map(|slack| slack.ln()).sum::<f64>())
+            .map(|(slacks, weight)| {
+                let slacks = slacks.iter().take(self.bounds);
+                weight * slacks.map(|slack| slack.ln()).sum::<f64>()
+            })
             .sum();
         Measure {
             violation: violation(values),
@@ -263,7 +269,7 @@ impl<'a, P: Program> State<'a, P> {
             dual: 1.0,
         };
         for (k, steps) in self.bound_step.iter_mut().enumerate() {
-            for (b, step) in steps.iter_mut().enumerate() {
+            for (b, step) in steps.iter_mut().enumerate().take(self.bounds) {
                 let (slack, multiplier) = (self.values.slacks[k][b], self.bound_multipliers[k][b]);
                 let rate = self.newton.slack_rate(&self.linear, k, b);
                 *step = (self.barrier * self.weights[k] - multiplier * rate) / slack - multiplier;
@@ -357,7 +363,7 @@ impl<'a, P: Program> State<'a, P> {
             *multiplier += primal * step;
         }
         for (k, multipliers) in self.bound_multipliers.iter_mut().enumerate() {
-            for (b, multiplier) in multipliers.iter_mut().enumerate() {
+            for (b, multiplier) in multipliers.iter_mut().enumerate().take(self.bounds) {
                 let central = self.barrier * self.weights[k] / self.values.slacks[k][b];
                 *multiplier = (*multiplier + dual * self.bound_step[k][b])
                     .clamp(central / SPREAD, central * SPREAD);
@@ -507,6 +513,10 @@ mod tests {
 
         fn linked_nodes(&self) -> Vec<[usize; 2]> {
             self.tied.iter().copied().collect()
+        }
+
+        fn bounds(&self) -> usize {
+            2
         }
 
         fn weights(&self) -> Vec<f64> {

@@ -20,7 +20,7 @@ use nalgebra::{Matrix6, SMatrix, SVector, Vector4};
 
 /// Most equality constraints at one node, or between one pair of nodes.
 pub const ROWS: usize = 6;
-/// Most inequalities at one stage; unused ones are 1 everywhere.
+/// Most inequalities at one stage.
 pub const BOUNDS: usize = 5;
 
 /// Values or multipliers of the constraints of one node or pair; unused rows are zero.
@@ -72,6 +72,9 @@ pub trait Program {
 
     /// The pairs of nodes that linear constraints tie together.
     fn linked_nodes(&self) -> Vec<[usize; 2]>;
+
+    /// Number of inequalities at every stage, the first of [`BOUNDS`].
+    fn bounds(&self) -> usize;
 
     /// The share of each stage in the whole, its weight in barrier and damping.
     fn weights(&self) -> Vec<f64>;

@@ -16,6 +16,7 @@ pub(super) struct Newton {
     links: Vec<[RowsByNode; 2]>,
     border: Border,
     weights: Vec<f64>,
+    bounds: usize,
     node_weights: Vec<f64>,
     damping: f64,
     right: Vec<NodeVector>,
@@ -27,7 +28,12 @@ pub(super) struct Newton {
 }
 
 impl Newton {
-    pub(super) fn new(linear: &Linearisation, pairs: Vec<[usize; 2]>, weights: &[f64]) -> Self {
+    pub(super) fn new(
+        linear: &Linearisation,
+        pairs: Vec<[usize; 2]>,
+        weights: &[f64],
+        bounds: usize,
+    ) -> Self {
         let nodes = weights.len() + 1;
         let half = |k: Option<usize>| k.and_then(|k| weights.get(k)).map_or(0.0, |w| 0.5 * w);
         let zeros = vec![NodeVector::zeros(); nodes];
@@ -41,6 +47,7 @@ impl Newton {
                 .map(|k| half(k.checked_sub(1)) + half(Some(k)))
                 .collect(),
             weights: weights.to_vec(),
+            bounds,
             damping: 0.0,
             right: zeros.clone(),
             correction: zeros.clone(),
@@ -66,7 +73,7 @@ impl Newton {
         self.chain.first_free = linear.chain.first_free;
         self.links.copy_from_slice(&linear.links);
         for (k, stage) in self.chain.stages.iter_mut().enumerate() {
-            for (b, gradient) in linear.slacks[k].iter().enumerate() {
+            for (b, gradient) in linear.slacks[k].iter().enumerate().take(self.bounds) {
                 let (slack, multiplier) = (values.slacks[k][b], bounds[k][b]);
                 if counts(slack, multiplier / self.weights[k]) {
                     stage.controls += multiplier / slack * gradient * gradient.transpose();
