@@ -51,7 +51,7 @@ $(VENV)/.packages: requirements-dev.txt
 
 $(CORE): $(VENV)/.packages $(RUST_SOURCES) pyproject.toml
 	$(NEED_CARGO)
-	@echo "building the Rust core (about a minute the first time)"
+	@echo "building the Rust core (a few minutes the first time)"
 	@$(PIP) install --no-deps --no-build-isolation --editable .
 	@touch $@
 

@@ -281,3 +281,23 @@ def test_square_rib_at_the_clamp_holds_a_wide_ribbon_up_longer() -> None:
     """By 9 %: a belt of width U/10 must turn its ribs within the first tenth of its length."""
     square = threshold("wunderlich", 0.1, (25.0, 26.0, 27.0, 28.0), square_rib=True)
     assert 1.02 * threshold("wunderlich", 0.1) < square < 1.25 * BUCKLING_WEIGHT
+
+
+def test_strip_pressed_in_its_plane_between_clamps_buckles() -> None:
+    """Pressed on edge at its middle by 200 R_f/U², far above what it bears flat."""
+    slide: Json = {"at": "end", "position": [0.0, "free", 0.0], "rotation": [0.0, 0.0, 0.0]}
+    press: Json = {"at": 0.5, "force": [0.0, 0.0, -200.0]}
+    scenario = board([straight(1.0)], [support("start", ORIGIN, ORIGIN), slide], points=[press], elements=80)
+    belt = solve(scenario)
+    assert belt.energy < -0.4
+    assert belt.stable is True
+
+
+def test_part_of_a_belt_may_buckle_under_its_weight() -> None:
+    """A clamp in the middle: what is beyond it is a cantilever on edge above its threshold."""
+    clamp: Json = {"at": 1.0, "position": [0.0, 0.8, 0.0], "rotation": [0.0, 0.0, 0.0], "square_rib": True}
+    supports = [support("start", ORIGIN, ORIGIN), clamp]
+    belt = solve(board([straight(2.0)], supports, density=1.0, gravity=(0.0, 0.0, -24.0)))
+    beyond = belt.u > 1.0
+    assert np.max(np.abs(belt.bend[beyond])) > 0.1
+    assert not any("flat" in warning for warning in belt.warnings)

@@ -19,11 +19,13 @@ from helpers import (
     Array,
     Energy,
     Json,
+    arc,
     board,
     internal_wrenches,
     node_at,
     numbers,
     result,
+    rigid,
     rotation_vector,
     solve,
     solve_any,
@@ -210,3 +212,60 @@ def test_links_of_a_closed_belt_may_reach_across_the_seam() -> None:
         scenario = closed(0, [support("start", ORIGIN, ORIGIN, square_rib=False)], elements=100)
         scenario["links"] = [link]
         assert solve_any(scenario).status == status
+
+
+# ------------------------------------------------------------------------------------- what the seam must not change
+
+
+def test_stiffener_may_begin_at_the_seam() -> None:
+    """Its ribs are square at both its ends, wherever the belt is cut open."""
+    rest = [straight(0.5), arc(0.4, 2.0)]
+    for half_turns in (0, 1):
+        one, other = (
+            solve(board(pieces, [], closed=True, half_turns=half_turns, width=0.1, elements=160))
+            for pieces in ([rigid(0.1), *rest], [rigid(0.05), *rest, rigid(0.05)])
+        )
+        assert np.abs(one.rib_slope[[0, -1]]) == pytest.approx([0.0, 0.0], abs=1e-12)
+        assert one.energy == pytest.approx(other.energy, rel=1e-6)
+
+
+def test_moment_may_act_at_the_seam() -> None:
+    """Two clamps, one of them at the seam or both away from it: the bend jumps at a clamp."""
+    energies = []
+    for shift in (0.0, 0.1):
+        held = [
+            {"at": "start" if shift == 0.0 else shift, "position": numbers(ORIGIN), "rotation": numbers(ORIGIN)},
+            {"at": 0.5 + shift, "position": [0.3, 0.1, 0.1], "rotation": [0.0, 0.4, math.pi]},
+        ]
+        energies.append(solve(board([straight(1.0)], held, closed=True, elements=160)).energy)
+    assert energies[0] == pytest.approx(energies[1], rel=1e-6)
+
+
+def test_supports_on_a_ring_are_met_by_that_ring() -> None:
+    """Whichever side the bulge is on."""
+    places = (0.4, 0.5)
+    supports = [support("start", ORIGIN, ORIGIN, square_rib=False)]
+    for u in places:
+        angle = math.tau * u
+        position = ((math.cos(angle) - 1.0) / math.tau, math.sin(angle) / math.tau, 0.0)
+        supports.append({**support("end", position, (0.0, 0.0, angle), square_rib=False), "at": u})
+    for side in (1.0, -1.0):
+        ring = solve(board([straight(1.0)], supports, closed=True, width=0.03, bulge=(side, 0.0, 0.0)))
+        assert ring.energy == pytest.approx(2.0 * math.pi**2, rel=1e-6)
+        assert not ring.warnings
+
+
+@pytest.mark.parametrize("elements", [240, 241, 267])
+def test_ring_that_lies_on_itself_keeps_the_half_turns_it_was_given(elements: int) -> None:
+    ring = solve(board([straight(1.0)], [], closed=True, half_turns=2, width=0.1, elements=elements))
+    assert ring.half_turns == 2
+    assert not ring.warnings
+
+
+def test_supports_too_far_apart_across_the_seam_are_named() -> None:
+    held = [(0.05, [0.0, 0.0, 0.0]), (0.5, [0.1, 0.2, 0.0]), (0.95, [0.0, 0.12, 0.0])]
+    supports: list[Json] = [{"at": u, "position": position} for u, position in held]
+    belt = solve_any(board([straight(1.0)], supports, closed=True))
+    assert belt.status == "infeasible"
+    assert "supports[2] and supports[0]" in belt.message
+    assert belt.half_turns is None

@@ -31,6 +31,7 @@ from helpers import (
     rotation_matrix,
     rotation_vector,
     solve,
+    solve_any,
     spine_at,
     straight,
     support,
@@ -473,3 +474,63 @@ def test_reactions_are_the_gradient_of_the_energy_where_ribs_touch_beside_a_bend
 
     force = at(0.0).reaction("end").force
     assert force[0] == pytest.approx((at(step).energy - at(-step).energy) / (2.0 * step), rel=1e-5)
+
+
+FACING_BACK: list[Json] = [
+    {"rotation": [0.0, 0.0, math.pi]},
+    {"rotation": [0.0, 0.0, -math.pi]},
+    {"rotation": [0.0, 0.0, 3.14159265]},
+    {"euler": [math.pi, 0.0, 0.0]},
+    {"quaternion": [0.0, 0.0, 0.0, 1.0]},
+    {"quaternion": [0.0, 0.0, 0.0, -1.0]},
+]
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("above", [0.2, -0.2])
+def test_end_facing_back_is_reached_the_short_way_round_however_it_is_written(above: float, side: float) -> None:
+    """A hairpin turns by half a turn; the other way round it would take three, or a loop."""
+    for frame in FACING_BACK:
+        supports = [support("start", ORIGIN, ORIGIN), {"at": "end", "position": [above, 0.0, 0.0], **frame}]
+        hairpin = solve(board([straight(1.0)], supports, bulge=(side, 0.0, 0.0), elements=80))
+        turned = float(np.trapezoid(hairpin.bend, hairpin.u))
+        assert turned == pytest.approx(-math.copysign(math.pi, above), abs=1e-6)
+        assert hairpin.energy == pytest.approx(11.643, rel=1e-3)
+
+
+def test_half_a_turn_of_twist_is_one_shape_however_it_is_written() -> None:
+    frames = [{"rotation": [0.0, turn, 0.0]} for turn in (math.pi, -math.pi)]
+    frames += [{"quaternion": [0.0, 0.0, turn, 0.0]} for turn in (1.0, -1.0)]
+    ends = [{"at": "end", "position": [0.0, 0.7, 0.0], **frame} for frame in frames]
+    found = [solve(board([straight(1.0)], [support("start", ORIGIN, ORIGIN), end])) for end in ends]
+    for belt in found[1:]:
+        assert np.max(np.abs(belt.position - found[0].position)) < 1e-6
+
+
+def test_s_board_with_a_pin_in_the_middle_is_solved_on_every_mesh() -> None:
+    pieces = [straight(0.02), arc(0.0314159265, 50.0), straight(0.02), arc(0.0314159265, -50.0), straight(0.02)]
+    supports = [
+        support("start", ORIGIN, ORIGIN),
+        {"at": 0.0614159265, "position": [0.01, 0.035, 0.025]},
+        support("end", (0.0, 0.05, 0.06), ORIGIN),
+    ]
+    energies = [
+        solve(board(pieces, supports, width=0.006, elements=count)).energy for count in (80, 120, 164, 160, 320)
+    ]
+    assert energies == pytest.approx([energies[-1]] * 5, rel=1e-2)
+
+
+def test_narrow_weak_stretch_of_a_table_is_seen_on_every_mesh() -> None:
+    table = {"u": [0.5015, 0.502, 0.504, 0.5045], "value": [1.0, 0.01, 0.01, 1.0]}
+    piece = straight(1.0, rigidity=table)
+    energies = [solve(held([piece], (0.0, 0.6, 0.0), ORIGIN, elements=count)).energy for count in (80, 320)]
+    cut = solve(held([straight(0.502), straight(0.002, rigidity=0.01), straight(0.496)], (0.0, 0.6, 0.0), ORIGIN))
+    assert energies[0] == pytest.approx(energies[1], rel=1e-5)
+    assert energies[0] == pytest.approx(cut.energy, rel=1e-2)
+
+
+def test_square_rib_that_would_leave_through_a_bend_is_no_crash() -> None:
+    supports: list[Json] = [{"at": 0.4, "position": [0.0, 0.0, 0.0], "square_rib": True}]
+    belt = solve_any(board([straight(0.4), corner(1.6), straight(0.6)], supports))
+    assert belt.status == "not_converged"
+    assert "ribs" in belt.message

@@ -393,3 +393,12 @@ def test_link_that_the_supports_contradict_is_named() -> None:
     status, said = outcome(redundant(np.add(END_POSITION, (0.1, 0.0, 0.0))))
     assert status in {"infeasible", "not_converged", "invalid"}
     assert "links[0]" in said
+
+
+def test_reaction_of_a_support_is_found_by_its_place() -> None:
+    belt = solve(held([{"at": 0.4, "position": [0.1, 0.3, 0.0]}]))
+    assert belt.reaction(0.4).force == pytest.approx(belt.reaction(1).force)
+    with pytest.raises(fb.NoSupport, match="allowed one of them"):
+        belt.reaction(0.41)
+    assert belt.links.shape == (0, 3)
+    assert belt.half_turns is None

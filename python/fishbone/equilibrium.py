@@ -287,8 +287,21 @@ class Equilibrium:
         """
         return RibMargin(*self._inner.rib_margin)
 
-    def reaction(self, support: Literal["start", "end"] | int) -> Reaction:
-        """What a support does to the belt: the one at the start, at the end, or by its index in the scenario.
+    @property
+    def links(self) -> Floats:
+        """Force of each link on the belt at its `to`, in the order of the scenario; at its `from` it is the opposite.
+
+        Shapes: (m, 3).
+        """
+        return np.array(self._inner.links).reshape(-1, 3)
+
+    @property
+    def half_turns(self) -> int | None:
+        """Signed half turns with which a closed belt ended; None of an open one."""
+        return self._inner.half_turns
+
+    def reaction(self, support: Literal["start", "end"] | float) -> Reaction:
+        """What a support does to the belt, by its index (int) or place ("start", "end", arc length as a float).
 
         Errors: `NoSupport`.
         """
@@ -299,15 +312,18 @@ class Equilibrium:
             raise NoSupport(f"support {support!r}: found {len(reactions)} supports") from None
         return Reaction(np.array(force), np.array(moment))
 
-    def _support_index(self, support: Literal["start", "end"] | int) -> int:
-        if not isinstance(support, str):
-            return support
-        ends = {"start": 0.0, "end": float(self.u[-1])}
+    def _support_index(self, support: Literal["start", "end"] | float) -> int:
+        if isinstance(support, int | np.integer):
+            return int(support)
+        length = float(self.u[-1])
+        place = {"start": 0.0, "end": length}.get(support) if isinstance(support, str) else float(support)
         places = [at for at, _, _ in self._inner.reactions]
         for index, at in enumerate(places):
-            if support in ends and math.isclose(at, ends[support], abs_tol=1e-9 * ends["end"]):
+            if place is not None and math.isclose(at, place, abs_tol=1e-9 * length):
                 return index
-        raise NoSupport(f'support {support!r}: found supports at u = {places}, allowed "start", "end" or an index')
+        raise NoSupport(
+            f'support {support!r}: found supports at u = {places}, allowed one of them, "start", "end" or an index'
+        )
 
     def surface(self, n_across: int = 9) -> Floats:
         """Points of the surface, on every rib from the −ζ edge to the +ζ edge.

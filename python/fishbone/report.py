@@ -18,6 +18,10 @@ if TYPE_CHECKING:
 
 DIGITS = 5
 """Significant digits: what a default mesh supports, about."""
+RIBS_MEET = 1e-3
+"""Bend radius, in widths, below which it says no more than that ribs meet there."""
+NOUGHT = 1e-9
+"""Rib angle [degrees] that is rounding."""
 
 
 def report(equilibrium: Equilibrium) -> Group:
@@ -84,9 +88,8 @@ def _quantities(equilibrium: Equilibrium) -> Iterator[tuple[str, str, str]]:
     if equilibrium.elastic_energy != equilibrium.energy:
         yield "elastic energy", number(equilibrium.elastic_energy), ""
     yield from _extremes(equilibrium)
-    half_turns = equilibrium.to_dict().get("half_turns")
-    if half_turns is not None:
-        yield "half turns", str(half_turns), "of a closed belt"
+    if equilibrium.half_turns is not None:
+        yield "half turns", str(equilibrium.half_turns), "of a closed belt"
     yield "local minimum", {True: "yes", False: "no", None: "not known"}[equilibrium.stable], ""
     for name, residual in equilibrium.residuals._asdict().items():
         yield f"residual, {name}", f"{residual:.1e}", ""
@@ -99,9 +102,11 @@ def _extremes(equilibrium: Equilibrium) -> Iterator[tuple[str, str, str]]:
     if on_spine is not None:
         yield "least bend radius, on the spine", number(on_spine.value), f"at u = {number(on_spine.u)}"
     if least is not None:
-        where = f"at u = {number(least.u)}, v = {number(least.v)} (see docs)"
-        yield "least bend radius, whole width", number(least.value), where
+        ribs_meet = least.value < RIBS_MEET * equilibrium.scenario.to_dict()["belt"]["width"]
+        value = "ribs meet" if ribs_meet else number(least.value)
+        yield "least bend radius, whole width", value, f"at u = {number(least.u)}, v = {number(least.v)} (see docs)"
     angle = np.degrees(equilibrium.rib_angle)
+    angle[np.abs(angle) < NOUGHT] = 0.0
     largest = int(np.argmax(np.abs(angle)))
     yield "largest rib angle", number(abs(angle[largest])), f"degrees, at u = {number(equilibrium.u[largest])}"
 
@@ -120,17 +125,25 @@ def _named_vectors(equilibrium: Equilibrium) -> Iterable[tuple[str, Floats]]:
     u, position = equilibrium.highest_point
     yield f"highest point, u = {number(u)}", position
     tables = equilibrium.scenario.to_dict()
+    yield from _free_ends(tables, equilibrium)
     yield from _loads(tables, equilibrium.u)
     for index, support in enumerate(tables["supports"]):
         place = _place(support["at"], equilibrium.u)
         force, moment = equilibrium.reaction(index)
         yield f"force on the belt, {place}", force
         yield f"moment on the belt, {place}", moment
-    forces = [np.array(link["force"]) for link in equilibrium.to_dict()["links"]]
     # A method that knows no forces gives none.
-    for link, force in zip(tables.get("links", []), forces, strict=False):
+    for link, force in zip(tables.get("links", []), equilibrium.links, strict=False):
         ends = [_place(link[end], equilibrium.u) for end in ("from", "to")]
         yield f"force of the link from {ends[0]}, {ends[1]}", force
+
+
+def _free_ends(tables: dict[str, Any], equilibrium: Equilibrium) -> Iterator[tuple[str, Floats]]:
+    """Where the ends of an open belt have gone that nothing holds in place."""
+    held = {_place(support["at"], equilibrium.u) for support in tables["supports"] if support.get("position")}
+    for name, node in [("start", 0), ("end", -1)]:
+        if name not in held and not tables["belt"].get("closed"):
+            yield f"free {name}", equilibrium.position[node]
 
 
 def _loads(tables: dict[str, Any], u: Floats) -> Iterator[tuple[str, Floats]]:

@@ -214,6 +214,18 @@ impl Equilibrium {
             .collect()
     }
 
+    /// Force of every link on the belt at its second point, in the order of the scenario.
+    #[getter]
+    fn links(&self) -> Vec<[f64; 3]> {
+        let links = self.solved.links.iter();
+        links.map(|link| array::row(&link.force)).collect()
+    }
+
+    #[getter]
+    fn half_turns(&self) -> Option<i32> {
+        self.solved.half_turns
+    }
+
     /// (u, position).
     #[getter]
     fn highest_point(&self) -> (f64, [f64; 3]) {

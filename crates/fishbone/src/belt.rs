@@ -69,6 +69,18 @@ struct Stretch<'a> {
     joint: Option<Piece>,
 }
 
+impl Stretch<'_> {
+    /// Elements that it takes where the rigidity changes along it: what bends goes with its inverse.
+    fn fewest(&self) -> usize {
+        const PER_FACTOR_E: f64 = 8.0;
+        let Segment::Strip(strip) = self.segment else {
+            return 1;
+        };
+        let [a, b] = [self.from, self.to].map(|u| strip.rigidity_at(u).ln());
+        (PER_FACTOR_E * (b - a).abs()).ceil() as usize
+    }
+}
+
 impl Strip {
     fn rigidity_at(&self, u: f64) -> f64 {
         match &self.rigidity {
@@ -131,6 +143,20 @@ impl Segment {
             Self::Rigid { length } => *length,
             Self::Corner { .. } => 0.0,
         }
+    }
+
+    /// Arc lengths inside the segment where its rigidity has a kink.
+    fn table_entries(&self, same: f64) -> Vec<f64> {
+        let Self::Strip(Strip {
+            rigidity: Rigidity::Table(table),
+            length,
+            ..
+        }) = self
+        else {
+            return Vec::new();
+        };
+        let inside = table.u.iter().filter(|u| **u > same && **u < length - same);
+        inside.copied().collect()
     }
 
     fn goes_on_to(&self, next: &Self) -> bool {
@@ -204,13 +230,13 @@ impl Belt {
         }
     }
 
-    /// `count` elements shared out by length, a few more where that takes parts of one between two breaks or ends of
-    /// segments; lengths in U, rigidity in its mean. A stiffened stretch is one piece.
+    /// `count` elements shared out by length, a few more where that takes parts of one between two breaks, ends of
+    /// segments or entries of a table of rigidity; lengths in U, rigidity in its mean. A stiffened stretch is one piece.
     pub fn pieces(&self, count: usize, breaks: &[Break]) -> Vec<Piece> {
         let length = self.length();
         let mut pieces = Vec::new();
         for stretch in &self.stretches(breaks) {
-            let share = share(count, (stretch.to - stretch.from) / length);
+            let share = share(count, (stretch.to - stretch.from) / length).max(stretch.fewest());
             pieces.extend(stretch.joint);
             match stretch.segment {
                 Segment::Strip(strip) => pieces.extend(self.elements(strip, stretch, share)),
@@ -235,12 +261,13 @@ impl Belt {
             let mut cuts: Vec<f64> = breaks.iter().map(|b| b.u - u).collect();
             cuts.retain(|cut| *cut > same && *cut < segment.length() - same);
             cuts.extend([0.0, segment.length()]);
+            cuts.extend(segment.table_entries(same));
             cuts.sort_by(f64::total_cmp);
             cuts.dedup_by(|b, a| *b - *a <= same);
             for cut in cuts.windows(2) {
                 let goes_on = stretches
                     .last()
-                    .is_none_or(|before| before.segment.goes_on_to(segment));
+                    .is_none_or(|before| before.segment.goes_on_to(segment) || cut[0] > 0.0);
                 let jump = near(u + cut[0]).any(|b| b.jump);
                 let turns = angle != 0.0;
                 let joined = !stretches.is_empty() && (turns || !goes_on || jump);
@@ -389,10 +416,11 @@ mod tests {
             curl: Curl::default(),
         })]);
         assert!((belt.mean_rigidity() - 2.0).abs() < 1e-15);
-        let Piece::Strip(element) = belt.pieces(1, &[])[0] else {
+        let pieces = belt.pieces(20, &[]);
+        let Piece::Strip(element) = pieces[0] else {
             unreachable!()
         };
-        let [a, b] = gauss_points().map(|t| 0.5 + t);
+        let [a, b] = gauss_points().map(|t| 0.5 + t / 20.0);
         assert!((element.rigidity[0] - a).abs() < 1e-15 && (element.rigidity[1] - b).abs() < 1e-15);
     }
 }

@@ -125,9 +125,10 @@ pub fn solve(scenario: &Scenario, proceed: &mut dyn FnMut() -> ControlFlow<()>) 
     }
 }
 
-/// Two supports in a row, and how far they are apart along the axes that both hold.
+/// Two points of the belt that are held at a distance from each other.
 struct Span {
-    u: [f64; 2],
+    /// Who holds them, and where.
+    held: String,
     distance: f64,
     /// The belt between them.
     belt: f64,
@@ -136,29 +137,51 @@ struct Span {
 }
 
 impl Span {
-    fn between(pair: &[SupportSpec], belt: &BeltSpec) -> Self {
+    /// Supports that follow each other, all round a closed belt, and the ends of links.
+    fn all(scenario: &Scenario) -> impl Iterator<Item = Self> {
+        let (belt, supports) = (&scenario.belt, &scenario.supports);
+        let count = supports.len();
+        let pairs = match belt.closed {
+            true => count,
+            false => count.saturating_sub(1),
+        };
+        let pairs = (0..pairs).map(move |i| [i, (i + 1) % count]);
+        let links = scenario.links.iter().enumerate();
+        pairs
+            .map(|pair| Self::between(pair, supports, belt))
+            .chain(links.map(|(i, link)| Self::of_link(i, link, belt)))
+    }
+
+    /// Between two supports, along the axes that both hold.
+    fn between([i, j]: [usize; 2], supports: &[SupportSpec], belt: &BeltSpec) -> Self {
         let length = belt.length();
-        let [x, x_next] = [0, 1].map(|i| pair[i].components());
-        let held = (0..3).filter_map(|i| x[i].zip(x_next[i]));
+        let [x, x_next] = [i, j].map(|k| supports[k].components());
+        let held = (0..3).filter_map(|k| x[k].zip(x_next[k]));
         let (square, size) = held.fold((0.0, 0.0), |(square, size), (a, b)| {
             (
                 square + (b - a) * (b - a),
                 f64::max(size, a.abs().max(b.abs())),
             )
         });
-        let u = [0, 1].map(|i| pair[i].at.arc_length(length));
+        let u = [i, j].map(|k| supports[k].at.arc_length(length));
+        let [at, at_next] = u.map(number);
         Self {
-            u,
+            held: format!("supports[{i}] and supports[{j}], at u = {at} and u = {at_next},"),
             distance: f64::sqrt(square),
             belt: belt_between(u, belt),
             rounding: 1e-12 * length + 4.0 * f64::EPSILON * size,
         }
     }
 
-    /// The supports of a scenario, each with the next.
-    fn all(scenario: &Scenario) -> impl Iterator<Item = Self> {
-        let pairs = scenario.supports.windows(2);
-        pairs.map(|pair| Self::between(pair, &scenario.belt))
+    fn of_link(i: usize, link: &LinkSpec, belt: &BeltSpec) -> Self {
+        let u = [link.from, link.to].map(|place| place.arc_length(belt.length()));
+        let [from, to] = u.map(number);
+        Self {
+            held: format!("the ends of links[{i}], at u = {from} and u = {to},"),
+            distance: Vector3::from(link.offset).norm(),
+            belt: belt_between(u, belt),
+            rounding: 1e-12 * belt.length(),
+        }
     }
 
     /// By how much the distance exceeds the belt in between.
@@ -176,44 +199,22 @@ fn belt_between(u: [f64; 2], belt: &BeltSpec) -> f64 {
     }
 }
 
-/// Says by how much two supports, or the ends of a link, are too far apart for the belt between them, where they are.
+/// Says by how much two points are held too far apart for the belt between them, where they are.
 fn excess_distance(scenario: &Scenario) -> Option<String> {
-    let mut spans = Span::all(scenario).enumerate();
-    if let Some((i, span)) = spans.find(|(_, span)| span.excess() > span.rounding) {
-        return Some(format!(
-            "supports[{i}] and supports[{}], at u = {} and u = {}, are {} apart, {} more than the belt between them ({}); \
-             move them closer",
-            i + 1,
-            number(span.u[0]),
-            number(span.u[1]),
-            number(span.distance),
-            number(span.excess()),
-            number(span.belt)
-        ));
-    }
-    let mut links = scenario.links.iter().enumerate();
-    links.find_map(|(i, link)| too_long(i, link, &scenario.belt))
+    let too_long = Span::all(scenario).find(|span| span.excess() > span.rounding)?;
+    Some(format!(
+        "{} are {} apart, {} more than the belt between them ({}); move them closer",
+        too_long.held,
+        number(too_long.distance),
+        number(too_long.excess()),
+        number(too_long.belt)
+    ))
 }
 
-/// Says that a link asks for more distance than there is belt between its ends, where it does.
-fn too_long(i: usize, link: &LinkSpec, belt: &BeltSpec) -> Option<String> {
-    let u = [link.from, link.to].map(|place| place.arc_length(belt.length()));
-    let (between, distance) = (belt_between(u, belt), Vector3::from(link.offset).norm());
-    (distance > between * (1.0 + 1e-12)).then(|| {
-        format!(
-            "links[{i}] holds u = {} and u = {} at a distance of {}, {} more than the belt between them; shorten its offset",
-            number(u[0]),
-            number(u[1]),
-            number(distance),
-            number(distance - between)
-        )
-    })
-}
-
-/// Whether two supports leave the belt between them so little slack that its reactions are not determined.
+/// Whether two points are held so far apart that the belt between them has no slack to determine its reactions.
 fn is_taut(scenario: &Scenario) -> bool {
     const SLACK: f64 = 1e-6;
-    Span::all(scenario).any(|span| span.excess() > -SLACK * span.belt)
+    Span::all(scenario).any(|span| span.belt > 0.0 && span.excess() > -SLACK * span.belt)
 }
 
 /// A number for people, six decimals or the exponent that it needs.

@@ -3,10 +3,14 @@
 use crate::lie::{Pose, exp, log};
 use crate::program::{BeltPoint, BeltProgram, NodeSupport, Piece};
 use nalgebra::{Matrix3, UnitQuaternion, Vector2, Vector3};
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Samples of the arch when its reach is measured.
 const SAMPLES: usize = 64;
+/// What a miss by the whole length counts for when arches are compared, as ∫ω_ζ² du: a tenth of it as much as a turn.
+const MISS: f64 = 10.0 * TAU * TAU;
+/// What bulging straight to the side asked for counts for.
+const BULGE: f64 = 100.0;
 /// Height of the arch at which its ends meet, the largest of any use.
 const HIGHEST: f64 = 2.4;
 
@@ -40,6 +44,12 @@ impl Arch {
         self.turn - self.amplitude * wave
     }
 
+    /// The integral of the squared bend.
+    fn energy(&self) -> f64 {
+        let wave = if self.pinned { PI } else { TAU };
+        self.turn * self.turn + 0.5 * (wave * self.amplitude).powi(2)
+    }
+
     /// Displacement from end to end along (ξ, η) of the frame at u = 0 before the amplitude turns it.
     fn reach(&self) -> Vector2<f64> {
         let tangent = |k: usize| {
@@ -64,9 +74,10 @@ pub(crate) fn guess(program: &BeltProgram, bulge: &Vector3<f64>) -> BeltPoint {
     point
 }
 
-/// The start for a closed belt before it is twisted: a ring or, of a curved board, a cone; to the side to which the belt
-/// curls of itself, else to that of the bulge.
+/// The start for a closed belt before it is twisted: a ring or, of a curved board, a cone; to the side where it comes nearer
+/// to its supports, else to that to which it curls of itself, else to that of the bulge.
 pub(crate) fn ring(program: &BeltProgram, bulge: &Vector3<f64>) -> BeltPoint {
+    const NEARER: f64 = 1e-6;
     let start = program.supports.first();
     let frame = start_frame(program, start, None, bulge);
     let curl: f64 = program
@@ -77,20 +88,27 @@ pub(crate) fn ring(program: &BeltProgram, bulge: &Vector3<f64>) -> BeltPoint {
         true => -frame.column(0).dot(bulge).signum(),
         false => curl.signum(),
     };
-    let bend = side * (TAU * TAU - total_turn(program).powi(2)).max(0.0).sqrt();
-    let slopes = calm_slopes(program).into_iter();
-    let fields: Vec<_> = slopes.map(|slope| Vector2::new(bend, slope)).collect();
-    let pose = Pose {
-        frame,
-        position: Vector3::zeros(),
-    };
-    let mut point = BeltPoint {
-        poses: vec![pose; fields.len()],
-        fields,
-    };
-    program.settle(&mut point);
-    place(&mut point, start, None);
-    point
+    let slopes = calm_slopes(program);
+    let [one, other] = [side, -side].map(|side| {
+        let bend = side * (TAU * TAU - total_turn(program).powi(2)).max(0.0).sqrt();
+        let field = |slope: &f64| Vector2::new(bend, *slope);
+        let fields: Vec<_> = slopes.iter().map(field).collect();
+        let pose = Pose {
+            frame,
+            position: Vector3::zeros(),
+        };
+        let mut point = BeltPoint {
+            poses: vec![pose; fields.len()],
+            fields,
+        };
+        program.settle(&mut point);
+        place(&mut point, start, None);
+        point
+    });
+    match program.miss_of_supports(&other) + NEARER < program.miss_of_supports(&one) {
+        true => other,
+        false => one,
+    }
 }
 
 /// The belt bent to an arch, from a frame at the origin.
@@ -277,13 +295,21 @@ pub(crate) fn disturb(program: &BeltProgram, point: &BeltPoint, share: f64) -> B
     inside(program, disturbed)
 }
 
-/// A flat belt bent to the side of the bulge, with ribs all sloping one way: what a load in its plane may buckle it into.
+/// Whether a belt is not bent at a node.
+pub(crate) fn is_flat(fields: &Vector2<f64>) -> bool {
+    const FLAT: f64 = 1e-6;
+    fields[0].abs() <= FLAT
+}
+
+/// A belt bent where it is flat, with ribs all sloping one way: what a load may buckle it into. With no waves it is bent to
+/// the side of the bulge, most at the start, as a cantilever; with some to and fro, as between clamps.
 ///
 /// In the flat state every slope of the ribs is as good as any other, so that small disturbances do not tell.
 pub(crate) fn buckle(
     program: &BeltProgram,
     point: &BeltPoint,
     slope: f64,
+    waves: f64,
     bulge: &Vector3<f64>,
 ) -> BeltPoint {
     const BEND: f64 = 1.0;
@@ -296,8 +322,14 @@ pub(crate) fn buckle(
         .map(|(_, element)| 0.5 / element.half_width)
         .fold(f64::INFINITY, f64::min);
     for ((fields, calm), u) in buckled.fields.iter_mut().zip(calm).zip(&board.u) {
-        let most = board.to_held(*u) * steepest;
-        *fields = Vector2::new(side * BEND * (1.0 - u), calm + slope.clamp(-most, most));
+        if is_flat(fields) {
+            let most = board.to_held(*u) * steepest;
+            let bend = match waves == 0.0 {
+                true => 1.0 - u,
+                false => 4.0 * (TAU * waves * u).cos(),
+            };
+            *fields = Vector2::new(side * BEND * bend, calm + slope.clamp(-most, most));
+        }
     }
     inside(program, buckled)
 }
@@ -365,7 +397,8 @@ fn chord(start: Option<&NodeSupport>, end: Option<&NodeSupport>) -> Option<Vecto
     Some(end?.point()? - start?.point()?)
 }
 
-/// The arch whose reach is nearest to the chord.
+/// The arch whose reach is nearest to the chord, on the side of the bulge. Where the belt turns so far that no side is that
+/// of the bulge, and where the end's frame may be reached either way round, it is the least bent.
 fn fit_arch(
     program: &BeltProgram,
     slopes: &[f64],
@@ -376,46 +409,64 @@ fn fit_arch(
 ) -> Arch {
     let held = |support: Option<&NodeSupport>| support.and_then(|s| s.hold.frame());
     let flat = UnitQuaternion::from_scaled_axis(total_turn(program) * Vector3::x());
-    let gap = match (held(start), held(end)) {
-        (Some(a), Some(b)) => log((a.conjugate() * b * flat.conjugate())
-            .to_rotation_matrix()
-            .matrix()),
-        _ => Vector3::zeros(),
+    let gaps = match (held(start), held(end)) {
+        (Some(a), Some(b)) => ways_round(&(a.conjugate() * b * flat.conjugate())),
+        _ => vec![Vector3::zeros()],
     };
-    let middle = frame * exp(&(0.5 * gap));
-    let side = if middle.column(0).dot(bulge) < 0.0 {
-        -1.0
-    } else {
-        1.0
-    };
-    let arch = |height: f64| Arch {
-        amplitude: side * height,
-        turn: gap.z,
-        pinned: held(start).is_none() && held(end).is_none(),
-    };
-    let Some(chord) = chord(start, end) else {
-        return arch(0.0);
-    };
+    let chord = chord(start, end);
     let straight = Headings::of(program).is_straight();
-    let local = frame.tr_mul(&chord);
-    let reach = |arch: &Arch| {
-        if straight {
-            let reach = arch.reach();
-            return Vector3::new(reach.x, reach.y, 0.0);
-        }
-        let poses = arched(program, arch, slopes, frame).poses;
-        let end = poses.last().map_or(Vector3::zeros(), |pose| pose.position);
-        frame.tr_mul(&end)
-    };
-    arch(least(HIGHEST, |height| {
-        let reach = reach(&arch(height));
+    let miss = |arch: &Arch| {
+        let Some(chord) = chord else { return 0.0 };
+        let reach = match straight {
+            true => arch.reach().push(0.0),
+            false => {
+                let poses = arched(program, arch, slopes, frame).poses;
+                frame.tr_mul(&poses.last().map_or(Vector3::zeros(), |pose| pose.position))
+            }
+        };
         // Not squared: on a nearly taut belt the miss is itself a square of the height.
-        if held(start).is_some() {
-            (reach - local).norm()
-        } else {
-            (reach.norm() - chord.norm()).abs()
+        match held(start).is_some() {
+            true => (reach - frame.tr_mul(&chord)).norm(),
+            false => (reach.norm() - chord.norm()).abs(),
         }
-    }))
+    };
+    let fitted = |gap: &Vector3<f64>, side: f64| {
+        let arch = |height: f64| Arch {
+            amplitude: side * height,
+            turn: gap.z,
+            pinned: held(start).is_none() && held(end).is_none(),
+        };
+        arch(match chord {
+            None => 0.0,
+            Some(_) => least(HIGHEST, |height| miss(&arch(height))),
+        })
+    };
+    let ways = gaps.iter().flat_map(|gap| {
+        let top = frame * exp(&(0.5 * gap));
+        let towards = top.column(0).dot(&bulge.normalize());
+        let is_clear = towards.abs() >= 0.5;
+        let sides = [1.0, -1.0].map(|side: f64| (side, side * towards));
+        let sides = sides
+            .into_iter()
+            .filter(move |(_, towards)| *towards >= 0.0 || !is_clear);
+        sides.map(move |(side, towards)| (gap, side, towards))
+    });
+    let costed = ways.map(|(gap, side, towards)| {
+        let arch = fitted(gap, side);
+        (arch.energy() + MISS * miss(&arch) - BULGE * towards, arch)
+    });
+    let best = costed.min_by(|a, b| a.0.total_cmp(&b.0));
+    best.map_or_else(|| fitted(&Vector3::zeros(), 1.0), |(_, arch)| arch)
+}
+
+/// The rotation vectors of a rotation, the shorter way and, beyond a quarter turn, the longer.
+fn ways_round(rotation: &UnitQuaternion<f64>) -> Vec<Vector3<f64>> {
+    let shorter = log(rotation.to_rotation_matrix().matrix());
+    let angle = shorter.norm();
+    match angle > FRAC_PI_2 {
+        true => vec![shorter, shorter * (1.0 - TAU / angle)],
+        false => vec![shorter],
+    }
 }
 
 /// Where a function of [0, `most`] is least: the best of a grid, then a ternary search around it.

@@ -18,7 +18,11 @@ pub fn half_turns(spine: &Spine) -> Option<i32> {
         } else {
             2
         };
-    let measured = 2.0 * (spine.twist() / TAU + writhe(&polygon(spine)));
+    let points = polygon(spine);
+    if touches_itself(&points) {
+        return Some(by_frames);
+    }
+    let measured = 2.0 * (spine.twist() / TAU + writhe(&points));
     let passes = (measured - f64::from(by_frames)) / 4.0;
     match passes.is_finite() && passes.abs() > DOUBT {
         true => Some(by_frames + 4 * passes.round() as i32),
@@ -57,6 +61,23 @@ fn polygon(spine: &Spine) -> Vec<Vector3<f64>> {
         .collect();
     points.dedup();
     points
+}
+
+/// Whether points far from each other along a closed polygon lie as close as it is smooth.
+fn touches_itself(points: &[Vector3<f64>]) -> bool {
+    const CLOSE: f64 = 1e-4;
+    let count = points.len();
+    let length: f64 = (0..count)
+        .map(|i| (points[(i + 1) % count] - points[i]).norm())
+        .sum();
+    let apart = |i: usize, j: usize| (i - j).min(count - (i - j)) > count / 20;
+    let close = |i: usize, j: usize| {
+        let (a, b) = (points[j], points[(j + 1) % count]);
+        let along = b - a;
+        let share = along.dot(&(points[i] - a)) / along.norm_squared();
+        (a + share.clamp(0.0, 1.0) * along - points[i]).norm() < CLOSE * length
+    };
+    (0..count).any(|i| (0..i).any(|j| apart(i, j) && close(i, j)))
 }
 
 /// Writhe of a closed polygon: the signed areas that pairs of its edges sweep on the sphere of directions, over 2π.

@@ -137,6 +137,7 @@ impl BeltProgram {
     pub fn with_supports(mut self, supports: Vec<NodeSupport>) -> Self {
         let nodes = self.pieces.len() + 1;
         self.fixed = (0..nodes).map(|node| self.fixed_by_pieces(node)).collect();
+        self.fix_across_seam();
         for support in supports.iter().filter(|support| support.square_rib) {
             self.fixed[support.node][1].get_or_insert(0.0);
         }
@@ -172,6 +173,17 @@ impl BeltProgram {
         match pieces.clone().any(|piece| is_rigid(&piece)) {
             true => [Some(0.0); 2],
             false => [None; 2],
+        }
+    }
+
+    /// Beside a stiffener at the seam of a closed belt the rib is square on both sides of the seam.
+    fn fix_across_seam(&mut self) {
+        let is_rigid = |piece: Option<&Piece>| matches!(piece, Some(Piece::Rigid { .. }));
+        let beside = is_rigid(self.pieces.first()) || is_rigid(self.pieces.last());
+        if self.half_turns.is_some() && beside {
+            for node in [0, self.pieces.len()] {
+                self.fixed[node][1] = Some(0.0);
+            }
         }
     }
 
@@ -231,13 +243,23 @@ impl BeltProgram {
 
     /// The least of how far the ribs are from crossing; negative infinity where one would leave through a bend.
     pub fn least_slack(&self, point: &BeltPoint) -> f64 {
-        let leaves = |node| self.is_tied(node) && self.carried_slope(point, node).is_none();
-        if (1..point.fields.len()).any(leaves) {
+        if self.rib_leaves_through_bend(point) {
             return f64::NEG_INFINITY;
         }
         self.elements()
             .flat_map(|(k, element)| element.slacks(&Self::fields_of(&point.fields, k)))
             .fold(f64::INFINITY, f64::min)
+    }
+
+    /// By how much a shape misses its supports, lengths in U and angles in rad.
+    pub fn miss_of_supports(&self, point: &BeltPoint) -> f64 {
+        let miss = |support: &NodeSupport| support.value(&point.poses[support.node]).norm();
+        self.supports.iter().map(miss).sum()
+    }
+
+    fn rib_leaves_through_bend(&self, point: &BeltPoint) -> bool {
+        let leaves = |node| self.is_tied(node) && self.carried_slope(point, node).is_none();
+        (1..point.fields.len()).any(leaves)
     }
 
     /// The rib slope of a node, where it is prescribed.
@@ -455,11 +477,9 @@ impl Program for BeltProgram {
                 Piece::Strip(element) => element.slacks(&Self::fields_of(&point.fields, k)),
                 Piece::Rigid { .. } | Piece::Joint { .. } => [1.0; BOUNDS],
             });
-            if self.is_tied(k + 1) && self.carried_slope(point, k + 1).is_none() {
-                return false;
-            }
         }
-        if !values.slacks.iter().flatten().all(|slack| *slack > 0.0) {
+        let admissible = values.slacks.iter().flatten().all(|slack| *slack > 0.0);
+        if !admissible || self.rib_leaves_through_bend(point) {
             return false;
         }
         self.carry(point);

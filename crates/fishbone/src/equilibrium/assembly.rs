@@ -37,7 +37,8 @@ impl<'a> Assembly<'a> {
     /// those of the scenario, then the seam of a closed belt.
     pub(super) fn program(&self, count: usize) -> BeltProgram {
         let pieces = self.belt.pieces(count, &self.breaks());
-        let bare = BeltProgram::new(pieces, self.scenario.energy);
+        let mut bare = BeltProgram::new(pieces, self.scenario.energy);
+        bare.half_turns = self.belt.half_turns;
         let places = Places::of(&bare);
         let mut supports: Vec<_> = self
             .scenario
@@ -56,7 +57,6 @@ impl<'a> Assembly<'a> {
         program.links = links;
         program.loads = self.node_loads(&places);
         program.weight = self.weight();
-        program.half_turns = self.belt.half_turns;
         program
     }
 
@@ -107,11 +107,26 @@ impl<'a> Assembly<'a> {
         let supports = self.scenario.supports.iter();
         let links = self.scenario.links.iter();
         let loads = self.scenario.loads.points.iter();
+        let bears = !self.is_left_alone();
         supports
-            .map(|support| at(&support.at, support.frame().is_some()))
+            .map(|support| at(&support.at, bears && support.frame().is_some()))
             .chain(links.flat_map(|link| [at(&link.from, false), at(&link.to, false)]))
             .chain(loads.map(|load| at(&load.at, load.lever != [0.0; 3])))
             .collect()
+    }
+
+    /// Whether nothing acts on a closed belt but, it may be, a single support, which then bears nothing.
+    fn is_left_alone(&self) -> bool {
+        let loads = &self.scenario.loads;
+        let unloaded = self.weight() == Vector3::zeros() && loads.points.is_empty();
+        self.belt.half_turns.is_some() && self.scenario.supports.len() <= 1 && unloaded
+    }
+
+    fn moment_acts_at_seam(&self) -> bool {
+        let length = self.units.length;
+        let breaks = self.breaks().into_iter().filter(|b| b.jump);
+        let mut ways = breaks.map(|b| b.u.min(length - b.u));
+        ways.any(|way| way <= SAME_PLACE * length)
     }
 
     fn node_support(&self, support: &SupportSpec, places: &Places) -> NodeSupport {
@@ -159,7 +174,8 @@ impl<'a> Assembly<'a> {
     fn seam(&self, half_turns: i32, last: usize) -> [NodeLink; 2] {
         let turn = UnitQuaternion::from_scaled_axis(PI * f64::from(half_turns) * Vector3::y());
         let sign = self.belt.seam_sign();
-        let goes_on = self.belt.goes_on_through_seam();
+        let [bend, slope] = self.belt.goes_on_through_seam();
+        let goes_on = [bend && !self.moment_acts_at_seam(), slope];
         let factors = goes_on.map(|goes_on| goes_on.then_some(sign));
         [Tie::Pose(turn), Tie::Fields(factors)].map(|tie| NodeLink {
             nodes: [0, last],

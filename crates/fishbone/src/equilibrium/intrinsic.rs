@@ -2,7 +2,7 @@
 
 use super::apart::keep_apart;
 use super::assembly::Assembly;
-use super::search::Search;
+use super::search::{Search, is_flat_under_load};
 use super::{
     Equilibrium, LinkForce, Reaction, Status, Units, Wrench, excess_distance, is_taut, number,
 };
@@ -15,6 +15,8 @@ use crate::solver::{Curvature, Outcome, Solution, dependent_constraints};
 use nalgebra::Vector3;
 use std::ops::ControlFlow;
 
+/// Residual of the constraints, lengths in U and angles in rad, above which they are missed and not only rounded.
+const CLEARLY_MISSED: f64 = 1e-6;
 /// Why a search does not begin.
 const CROSSING: &str = "no ribs found that do not cross: the bends, arcs and square ribs of the board are too close together \
                         for its width; make it narrower or the segments longer";
@@ -41,14 +43,17 @@ pub(super) fn solve(
     };
     let stable = stable(status, solution.curvature);
     let spine = assembly.spine(&program, &solution.point);
-    let half_turns = half_turns(&spine);
+    let half_turns = match status {
+        Status::Converged => half_turns(&spine),
+        Status::Infeasible | Status::NotConverged => None,
+    };
     let internal = program.internal(&solution.point, &solution.multipliers);
     let links = program.link_forces(&solution.multipliers).into_iter();
     Equilibrium {
         status,
         message,
         warnings: [
-            warnings(scenario, &program, stable),
+            warnings(scenario, &program, &solution.point, status, stable),
             doubts,
             passed_through_itself(scenario, half_turns),
         ]
@@ -143,14 +148,6 @@ fn judge(
     said_twice: Option<&str>,
 ) -> (Status, String) {
     let tolerance = scenario.solver.tolerance;
-    if let (Some(names), false) = (said_twice, solution.outcome == Outcome::Converged) {
-        return (
-            Status::Infeasible,
-            format!(
-                "{names} contradict each other: they hold the same twice over, and not alike; leave one out"
-            ),
-        );
-    }
     let largest = solution.residuals.largest();
     let (iterations, violation) = (solution.iterations, solution.residuals.constraint);
     match solution.outcome {
@@ -166,6 +163,18 @@ fn judge(
             Status::Converged,
             format!("converged in {iterations} iterations, largest residual {largest:.1e}"),
         ),
+        Outcome::LocallyInfeasible | Outcome::IterationLimit | Outcome::Stalled
+            if let Some(names) =
+                said_twice.filter(|_| violation > tolerance.max(CLEARLY_MISSED)) =>
+        {
+            (
+                Status::Infeasible,
+                format!(
+                    "{names} cannot be met: what is held there is held already, by the rest or by a stiffener, and not \
+                     alike; leave one out"
+                ),
+            )
+        }
         Outcome::IterationLimit => (
             Status::NotConverged,
             format!(
@@ -190,8 +199,8 @@ fn judge(
         Outcome::Unbounded => (
             Status::NotConverged,
             format!(
-                "the energy gives no direction to go after {iterations} iterations, largest residual {largest:.1e}; \
-                 try another solver.bulge or more solver.elements"
+                "the energy has no least value after {iterations} iterations, largest residual {largest:.1e}; hold the belt \
+                 where it may slide or fall, or try another solver.bulge"
             ),
         ),
         Outcome::Inadmissible => (Status::NotConverged, CROSSING.to_owned()),
@@ -221,17 +230,27 @@ fn passed_through_itself(scenario: &Scenario, half_turns: Option<i32>) -> Vec<St
     said.into_iter().collect()
 }
 
-fn warnings(scenario: &Scenario, program: &BeltProgram, stable: Option<bool>) -> Vec<String> {
+fn warnings(
+    scenario: &Scenario,
+    program: &BeltProgram,
+    point: &BeltPoint,
+    status: Status,
+    stable: Option<bool>,
+) -> Vec<String> {
     // Strong twist makes facets of the scale of V, which longer elements cannot resolve.
     const SAFE: f64 = 8.0;
+    const THICK: f64 = 0.25;
     let shares = program
         .elements()
         .map(|(_, e)| e.length / (2.0 * e.half_width));
     let longest = shares.fold(0.0, f64::max);
     let coarse = longest * SAFE > 1.0 + 1e-9;
-    let taut = is_taut(scenario);
+    let taut = status != Status::Infeasible && is_taut(scenario);
+    let flat = status == Status::Converged && is_flat_under_load(program, point);
     let weightless = scenario.loads.gravity.is_some_and(|g| g != [0.0; 3])
         && scenario.belt.density_value() == 0.0;
+    let thick = scenario.belt.thickness();
+    let thick = thick.filter(|thickness| *thickness > THICK * scenario.belt.width);
     let saddle = stable == Some(false);
     let turned = scenario
         .supports
@@ -250,6 +269,16 @@ fn warnings(scenario: &Scenario, program: &BeltProgram, stable: Option<bool>) ->
         }),
         weightless.then(|| {
             "gravity acts on no mass: give belt.density, or that of its material or layers".to_owned()
+        }),
+        thick.map(|thickness| {
+            format!(
+                "a belt {} thick and {} wide is no thin strip: thicknesses are in the unit of length of the rest",
+                number(thickness),
+                number(scenario.belt.width)
+            )
+        }),
+        flat.then(|| {
+            "a part of the loaded belt has stayed flat: whether it would rather buckle could not be told".to_owned()
         }),
         saddle.then(|| "the equilibrium is no minimum of the energy: try another solver.bulge".to_owned()),
     ]

@@ -1,7 +1,7 @@
 //! The search for a minimum: where it starts, and where it starts again.
 
 use crate::energy::EnergyModel;
-use crate::guess::{buckle, disturb, guess, inside, ring};
+use crate::guess::{buckle, disturb, guess, inside, is_flat, ring};
 use crate::program::{BeltPoint, BeltProgram, Piece};
 use crate::scenario::SAME_PLACE;
 use crate::solver::{self, Curvature, Outcome, Settings, Solution};
@@ -91,15 +91,13 @@ impl Search {
             Some(half_turns) => self.twisted_up(program, half_turns, proceed),
         };
         let mut best = self.minimise(program, start.clone(), COLD, proceed);
-        if !is_done(&best) && program.model != EnergyModel::Wunderlich {
-            best = better(best, |_| {
-                self.by_way_of_wunderlich(program, &start, proceed)
-            });
+        if !is_done(&best) {
+            best = better(best, |_| self.by_way_of_another(program, &start, proceed));
         }
-        for slope in [SLANT, -SLANT] {
-            if is_flat_under_load(program, &best) {
+        for (slope, wave) in [(SLANT, 0.0), (-SLANT, 0.0), (0.0, 1.0), (0.0, 2.0)] {
+            if is_flat_under_load(program, &best.point) {
                 best = better(best, |best| {
-                    let buckled = buckle(program, &best.point, slope, &self.bulge);
+                    let buckled = buckle(program, &best.point, slope, wave, &self.bulge);
                     self.minimise(program, buckled, WARM, proceed)
                 });
             }
@@ -140,16 +138,20 @@ impl Search {
         inside(program, point)
     }
 
-    /// Solves with the energy that keeps the ribs apart of itself, and from there with the one asked for.
-    fn by_way_of_wunderlich(
+    /// Solves with another energy, and from there with the one asked for: with `wunderlich`, which keeps the ribs apart of
+    /// itself, or where that fails with `sadowsky`, which lets them come close.
+    fn by_way_of_another(
         &self,
         program: &BeltProgram,
         start: &BeltPoint,
         proceed: &mut Proceed,
     ) -> Solution<BeltPoint> {
-        let mut smooth = program.clone();
-        smooth.model = EnergyModel::Wunderlich;
-        let found = self.minimise(&smooth, start.clone(), COLD, proceed);
+        let mut other = program.clone();
+        other.model = match program.model {
+            EnergyModel::Wunderlich => EnergyModel::Sadowsky,
+            EnergyModel::Fishbone | EnergyModel::Sadowsky => EnergyModel::Wunderlich,
+        };
+        let found = self.minimise(&other, start.clone(), COLD, proceed);
         let iterations = found.iterations;
         self.minimise(program, inside(program, found.point), WARM, proceed)
             .after(iterations)
@@ -179,12 +181,14 @@ fn is_done(solution: &Solution<BeltPoint>) -> bool {
     solution.outcome == Outcome::Interrupted || rank(solution) == 2
 }
 
-/// Whether a belt under load has stayed flat: there the slope of its ribs costs nothing, and what it buckles into cannot
-/// be seen in the second variation.
-fn is_flat_under_load(program: &BeltProgram, solution: &Solution<BeltPoint>) -> bool {
-    const FLAT: f64 = 1e-6;
-    let mut fields = solution.point.fields.iter();
-    program.is_loaded() && fields.all(|fields| fields[0].abs() <= FLAT)
+/// Whether a good part of a belt under load has stayed flat: there the slope of its ribs costs nothing, and what it buckles
+/// into cannot be seen in the second variation.
+pub(super) fn is_flat_under_load(program: &BeltProgram, point: &BeltPoint) -> bool {
+    const PART: f64 = 0.1;
+    let fields = &point.fields;
+    let flat = fields.iter().filter(|fields| is_flat(fields)).count();
+    let stiff = fields.len() - program.elements().count();
+    program.is_loaded() && flat as f64 > PART * fields.len() as f64 + stiff as f64
 }
 
 /// The better of two ends, of equals the lower, with the iterations of both.

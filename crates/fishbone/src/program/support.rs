@@ -59,7 +59,13 @@ impl RotationGap {
     pub(super) fn new(prescribed: &UnitQuaternion<f64>, frame: &Matrix3<f64>) -> Self {
         let now = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(*frame));
         let gap = prescribed.conjugate() * now;
-        let sign = if gap.w < 0.0 { -1.0 } else { 1.0 };
+        // At a half-turn rounding must not choose between its two sides.
+        const HALF_TURN: f64 = 1e-9;
+        let decisive = match gap.w.abs() > HALF_TURN {
+            true => gap.w,
+            false => gap.imag()[gap.imag().iamax()],
+        };
+        let sign = 1f64.copysign(decisive);
         Self {
             scalar: sign * gap.w,
             vector: sign * gap.imag(),

@@ -474,6 +474,21 @@ impl BeltSpec {
         own.map_or(self.density, |mass| mass * self.width)
     }
 
+    /// Thickness of the sheet or of all layers; `None` where the belt is given by its rigidity.
+    pub fn thickness(&self) -> Option<f64> {
+        let sheet = self.material.as_ref().map(|sheet| sheet.thickness);
+        let layers = || {
+            Some(
+                self.layers
+                    .as_ref()?
+                    .iter()
+                    .map(|layer| layer.thickness)
+                    .sum(),
+            )
+        };
+        sheet.or_else(layers)
+    }
+
     /// Whether any part of the unloaded belt is bent.
     pub fn has_natural_bend(&self) -> bool {
         self.segments

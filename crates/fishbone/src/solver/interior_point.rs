@@ -23,6 +23,9 @@ pub fn minimise<P: Program>(
     state.finish(outcome)
 }
 
+/// An objective below minus this, in its unit, has no least.
+const BOTTOMLESS: f64 = 1e12;
+
 /// Everything that changes from one iteration to the next.
 struct State<'a, P: Program> {
     program: &'a P,
@@ -102,6 +105,9 @@ impl<'a, P: Program> State<'a, P> {
         loop {
             if self.residuals(0.0).largest() <= self.settings.tolerance {
                 return Outcome::Converged;
+            }
+            if self.values.objective < -BOTTOMLESS {
+                return Outcome::Unbounded;
             }
             if self.iteration >= self.settings.iterations {
                 return Outcome::IterationLimit;

@@ -67,7 +67,7 @@ impl Linearisation {
 
 /// The constraints that take part in a combination of rows that gives way to nothing.
 fn involved(give: &DMatrix<f64>) -> Vec<usize> {
-    const NOTHING: f64 = 1e-11;
+    const NOTHING: f64 = 1e-13;
     const PART: f64 = 1e-3;
     let rows = 0..give.nrows();
     let used: Vec<usize> = rows.filter(|row| give[(*row, *row)] > 0.0).collect();

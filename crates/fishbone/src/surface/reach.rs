@@ -6,22 +6,21 @@ use super::flat::direction;
 use super::outline;
 use crate::spine::{Piece, Spine};
 use crate::strip::{Edge, FURTHER};
+use nalgebra::Vector2;
 use std::f64::consts::PI;
 
+/// What rounding does to 1 − s v of ribs that just touch.
+const TOUCHING: f64 = 1e-4;
 /// Turn of the outline that is none.
 const STRAIGHT: f64 = 1e-9;
 
-/// The elements of which ribs cross on the board, those at both ends and in the middle tested; on a straight board they are
-/// left to the bound |s| ≤ 2/V.
+/// The elements of which ribs cross on the board: that in the middle with its neighbours, or those at both ends with each
+/// other. On a straight board they are left to the bound |s| ≤ 2/V.
 ///
 /// # Panics
 ///
 /// If the spine has no nodes.
 pub fn crossings(spine: &Spine) -> Vec<usize> {
-    /// What rounding does to ribs that just touch.
-    const CLEARLY: f64 = 1e-4;
-    /// What the length of the elements does to them on an arc, where the bound holds in the middle.
-    const AT_NODES: f64 = 0.05;
     let bends = |piece: &Piece| piece.geodesic() != 0.0 || piece.corner() != 0.0;
     if !spine.pieces.iter().any(bends) {
         return Vec::new();
@@ -29,15 +28,32 @@ pub fn crossings(spine: &Spine) -> Vec<usize> {
     let board = Board::of(spine);
     let crosses = |element: &usize| {
         let s = mean_convergence(spine, *element);
-        let nodes = [*element, element + 1].map(|node| board.foot_at_node(spine, node));
-        let meet = |foot: &Foot, share: f64| {
-            let ends = board.ends(foot);
-            ends.iter().any(|end| s * end.v > share)
-        };
-        meet(&middle(spine, &board, *element), 1.0 + CLEARLY)
-            || nodes.iter().any(|foot| meet(foot, 1.0 + AT_NODES))
+        let ends = board.ends(&middle(spine, &board, *element));
+        ends.iter().any(|end| s * end.v > 1.0 + TOUCHING)
+            || cross(
+                &board,
+                [0, 1].map(|i| board.foot_at_node(spine, element + i)),
+            )
     };
     strips(spine).filter(crosses).collect()
+}
+
+/// Whether two ribs cross clearly inside the board: on an arc the bound holds in the middle of an element, and at its
+/// ends only as well as its length allows.
+fn cross(board: &Board, feet: [Foot; 2]) -> bool {
+    const INSIDE: f64 = 0.95;
+    let directions = feet.map(|foot| {
+        let along = Vector2::new(-foot.point.rib_slope, 1.0);
+        foot.flat.global(&along) - foot.flat.position
+    });
+    let gap = feet[1].flat.position - feet[0].flat.position;
+    let parallel = directions[0].perp(&directions[1]);
+    let v = [1, 0].map(|other: usize| gap.perp(&directions[other]) / parallel);
+    parallel != 0.0
+        && feet.iter().zip(v).all(|(foot, v)| {
+            let [minus, plus] = board.ends(foot);
+            (INSIDE * minus.v..INSIDE * plus.v).contains(&v)
+        })
 }
 
 /// Of every flexible element the edges before which its ribs must not cross besides |s| ≤ 2/V: where the outline turns
