@@ -21,6 +21,7 @@ from fishbone.equilibrium import (
     RibMargin,
     SpineRadius,
     solve,
+    solve_many,
 )
 from fishbone.errors import (
     FishboneError,
@@ -53,6 +54,7 @@ __all__ = [
     "__version__",
     "load",
     "solve",
+    "solve_many",
 ]
 
 

@@ -1,9 +1,10 @@
+from collections.abc import Callable
 from typing import Final, Literal, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Equilibrium", "Scenario", "__version__", "solve"]
+__all__ = ["Equilibrium", "Scenario", "__version__", "solve", "solve_many"]
 
 __version__: Final[str]
 
@@ -91,3 +92,6 @@ class Equilibrium:
     def to_json(self) -> str: ...
 
 def solve(scenario: Scenario) -> Equilibrium: ...
+def solve_many(
+    scenarios: list[Scenario], progress: Callable[[int, int], object] | None = None
+) -> list[Equilibrium]: ...

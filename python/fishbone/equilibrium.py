@@ -12,6 +12,8 @@ from fishbone import _core
 from fishbone.errors import InvalidArgument, NoSupport, NotConverged
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
     import numpy.typing as npt
     from numpy.typing import NDArray
 
@@ -414,13 +416,32 @@ def solve(scenario: Scenario, *, strict: bool = False) -> Equilibrium:
     Errors: `NotConverged`, which carries the equilibrium, where `strict` is asked for; `InvalidArgument` where
     `scenario` is none.
     """
-    inner = getattr(scenario, "_inner", None)
-    if not isinstance(inner, _core.Scenario):
-        raise InvalidArgument(f"scenario: found {type(scenario).__name__}, allowed a Scenario, as fishbone.load gives")
-    equilibrium = Equilibrium(scenario, _core.solve(inner))
+    equilibrium = Equilibrium(scenario, _core.solve(_core_of(scenario)))
     if strict and equilibrium.status != "converged":
         raise NotConverged(equilibrium)
     return equilibrium
+
+
+def solve_many(
+    scenarios: Iterable[Scenario], *, progress: Callable[[int, int], object] | None = None
+) -> list[Equilibrium]:
+    """Finds the equilibria of many scenarios over all cores, in the order given; a failure spoils no other.
+
+    `progress(solved, all)` is called now and then from the calling thread. Other threads run meanwhile, and Ctrl-C ends
+    the solves. The environment variable RAYON_NUM_THREADS limits the number of threads.
+
+    Errors: `InvalidArgument` where one of `scenarios` is none; whatever `progress` raises.
+    """
+    scenarios = list(scenarios)
+    found = _core.solve_many([_core_of(scenario) for scenario in scenarios], progress)
+    return [Equilibrium(scenario, inner) for scenario, inner in zip(scenarios, found, strict=True)]
+
+
+def _core_of(scenario: Scenario) -> _core.Scenario:
+    inner = getattr(scenario, "_inner", None)
+    if not isinstance(inner, _core.Scenario):
+        raise InvalidArgument(f"scenario: found {type(scenario).__name__}, allowed a Scenario, as fishbone.load gives")
+    return inner
 
 
 def _across(n_across: int) -> int:

@@ -12,7 +12,7 @@ use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 /// Short enough for Ctrl-C to feel immediate, long enough to cost nothing.
-const SIGNAL_INTERVAL: Duration = Duration::from_millis(50);
+pub(crate) const SIGNAL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Solves a scenario with the GIL released.
 ///
@@ -20,12 +20,25 @@ const SIGNAL_INTERVAL: Duration = Duration::from_millis(50);
 #[pyfunction]
 pub(crate) fn solve(py: Python<'_>, scenario: &Scenario) -> PyResult<Equilibrium> {
     let mut signals = Signals::new();
-    let start = Instant::now();
-    let solved = py.detach(|| equilibrium::solve(&scenario.0, &mut || signals.proceed()));
-    let solve_time = start.elapsed().as_secs_f64();
+    let found = py.detach(|| Equilibrium::timed(&scenario.0, &mut || signals.proceed()));
     match signals.raised {
         Some(error) => Err(error),
-        None => Ok(Equilibrium { solved, solve_time }),
+        None => Ok(found),
+    }
+}
+
+impl Equilibrium {
+    /// Solves and takes the time.
+    pub(crate) fn timed(
+        scenario: &fishbone::scenario::Scenario,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Self {
+        let start = Instant::now();
+        let solved = equilibrium::solve(scenario, proceed);
+        Self {
+            solved,
+            solve_time: start.elapsed().as_secs_f64(),
+        }
     }
 }
 

@@ -1,12 +1,15 @@
 //! Python bindings: convert, release the GIL, call.
 
 mod array;
+mod batch;
 mod equilibrium;
 mod scenario;
 
 /// The compiled core of fishbone; `fishbone` itself is its public face.
 #[pyo3::pymodule]
 mod _core {
+    #[pymodule_export]
+    use crate::batch::solve_many;
     #[pymodule_export]
     use crate::equilibrium::{Equilibrium, solve};
     #[pymodule_export]
