@@ -469,10 +469,12 @@ fn ways_round(rotation: &UnitQuaternion<f64>) -> Vec<Vector3<f64>> {
     }
 }
 
-/// Where a function of [0, `most`] is least: the best of a grid, then a ternary search around it.
+/// Where a function of [0, `most`] is least: the best of a grid, then a golden-section search around it, to a thousandth of
+/// itself.
 fn least(most: f64, f: impl Fn(f64) -> f64) -> f64 {
     const GRID: usize = 24;
-    const NARROWINGS: usize = 60;
+    const NARROW: f64 = 1e-3;
+    const LEAST: f64 = 1e-7;
     let step = most / GRID as f64;
     let (mut best, mut value) = (0.0, f64::INFINITY);
     for k in 0..=GRID {
@@ -481,13 +483,22 @@ fn least(most: f64, f: impl Fn(f64) -> f64) -> f64 {
             (best, value) = (k as f64 * step, here);
         }
     }
+    let ratio = 0.5 * (5f64.sqrt() - 1.0);
     let (mut low, mut high) = ((best - step).max(0.0), (best + step).min(most));
-    for _ in 0..NARROWINGS {
-        let third = (high - low) / 3.0;
-        if f(low + third) <= f(high - third) {
-            high -= third;
+    let inner = |low: f64, high: f64| [high - ratio * (high - low), low + ratio * (high - low)];
+    let [mut left, mut right] = inner(low, high);
+    let (mut at_left, mut at_right) = (f(left), f(right));
+    while high - low > NARROW * high + LEAST {
+        if at_left <= at_right {
+            high = right;
+            (right, at_right) = (left, at_left);
+            left = inner(low, high)[0];
+            at_left = f(left);
         } else {
-            low += third;
+            low = left;
+            (left, at_left) = (right, at_right);
+            right = inner(low, high)[1];
+            at_right = f(right);
         }
     }
     0.5 * (low + high)

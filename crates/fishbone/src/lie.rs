@@ -340,20 +340,38 @@ fn stumpff(t: f64) -> [f64; 8] {
 /// c₆ and c₇ by series, the others by c_n = 1/n! − t c_{n+2}, which is stable downwards.
 fn stumpff_by_series(t: f64) -> [f64; 8] {
     let mut c = INVERSE_FACTORIAL;
-    c[6] *= series_tail(t, 6.0);
-    c[7] *= series_tail(t, 7.0);
+    if t < FEW_TERMS_BELOW {
+        (c[6], c[7]) = (series::<5>(t, &SIXTH), series::<5>(t, &SEVENTH));
+    } else {
+        (c[6], c[7]) = (series::<9>(t, &SIXTH), series::<9>(t, &SEVENTH));
+    }
     for n in (0..6).rev() {
         c[n] -= t * c[n + 2];
     }
     c
 }
 
-/// n! c_n(t) by nested multiplication; eight factors leave less than 1e-18 at t = 1.
-fn series_tail(t: f64, n: f64) -> f64 {
-    (1..=8).rev().fold(1.0, |tail, k| {
-        let j = n + 2.0 * f64::from(k);
-        1.0 - t * tail / (j * (j - 1.0))
-    })
+/// Below this t five terms leave less than 1e-18, up to t = 1 nine.
+const FEW_TERMS_BELOW: f64 = 0.05;
+const SIXTH: [f64; 9] = series_coefficients(6);
+const SEVENTH: [f64; 9] = series_coefficients(7);
+
+/// (−1)^k / (2k + n)!
+const fn series_coefficients(n: usize) -> [f64; 9] {
+    let mut coefficients = [INVERSE_FACTORIAL[n]; 9];
+    let mut k = 1;
+    while k < 9 {
+        let j = (n + 2 * k) as f64;
+        coefficients[k] = -coefficients[k - 1] / (j * (j - 1.0));
+        k += 1;
+    }
+    coefficients
+}
+
+/// The first terms of a power series.
+fn series<const TERMS: usize>(t: f64, coefficients: &[f64; 9]) -> f64 {
+    let terms = coefficients[..TERMS].iter().rev();
+    terms.fold(0.0, |sum, coefficient| sum * t + coefficient)
 }
 
 /// sin and cos, the others by c_{n+2} = (1/n! − c_n) / t.
