@@ -561,7 +561,10 @@ impl BeltProgram {
             piece @ (Piece::Rigid { .. } | Piece::Joint { .. }) => {
                 let motion = piece.motion(&Vector4::zeros());
                 let force = pose.frame.tr_mul(&adjoint.force);
-                into.chain.stages[k] = carry_state(&pose.frame, &motion, &force);
+                let stage = &mut into.chain.stages[k];
+                carry_state(stage, &pose.frame, &motion, &force);
+                stage.controls.fill(0.0);
+                stage.tie.fill(0.0);
                 into.slacks[k] = [Vector4::zeros(); BOUNDS];
                 motion
             }
@@ -602,9 +605,9 @@ impl BeltProgram {
         let gradient = energy.gradient
             + jet.position_by_fields.tr_mul(&force)
             + jet.rotation_by_fields.tr_mul(&beyond.moment);
-        let mut stage = carry_state(frame, &jet.value, &force);
-        carry_controls(&mut stage, frame, &jet, &force, &beyond.moment, controls);
-        into.chain.stages[k] = stage;
+        let stage = &mut into.chain.stages[k];
+        carry_state(stage, frame, &jet.value, &force);
+        carry_controls(stage, frame, &jet, &force, &beyond.moment, controls);
         into.slacks[k] = slacks.map(|slack| slack.gradient);
         for (node, rows) in [(k, 0), (k + 1, 2)] {
             let mut part = into.gradient[node].fixed_rows_mut::<2>(6);
@@ -667,10 +670,9 @@ fn add_state(into: &mut Linearisation, node: usize, hessian: &Matrix3<f64>) {
 }
 
 /// How a motion carries the pose on, and the second derivatives of the work done at its far end by `force`, in the axes
-/// of the frame it starts from.
-fn carry_state(frame: &Matrix3<f64>, motion: &Pose, force: &Vector3<f64>) -> Stage {
+/// of the frame it starts from; of the stage that belongs to it always the same entries.
+fn carry_state(stage: &mut Stage, frame: &Matrix3<f64>, motion: &Pose, force: &Vector3<f64>) {
     let p = &motion.position;
-    let mut stage = Stage::zero();
     let carried = &mut stage.state_by_state;
     carried.fixed_view_mut::<3, 3>(0, 0).fill_with_identity();
     carried
@@ -684,7 +686,6 @@ fn carry_state(frame: &Matrix3<f64>, motion: &Pose, force: &Vector3<f64>) -> Sta
         .state_state
         .fixed_view_mut::<3, 3>(3, 3)
         .copy_from(&(outer - force.dot(p) * Matrix3::identity()));
-    stage
 }
 
 /// How the fields of an element carry the pose on, and the second derivatives of the work done at its second node:
