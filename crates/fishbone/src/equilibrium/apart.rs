@@ -2,21 +2,28 @@
 //!
 //! |s| ≤ 2/V keeps them apart between the edges of their own stretch. Where the outline turns inwards, at the inner side of a bend,
 //! steep ribs reach farther; which edge bounds them there depends on the shape. So the search begins without, and goes on with
-//! the edges that the ribs of the shape found are nearest to crossing at, until none cross.
+//! the edges that the ribs of the shape found are nearest to crossing at, until none cross and none is held by an edge that it
+//! does not reach.
 
 use super::assembly::Assembly;
 use super::search::Search;
+use crate::element::Element;
 use crate::program::{BeltPoint, BeltProgram, Piece};
 use crate::solver::{Outcome, Solution};
 use crate::spine::Spine;
+use crate::strip::{Edge, FURTHER};
 use crate::surface::{crossings, further_edges};
 use std::ops::ControlFlow;
 
 /// Most times that further edges are taken.
 const ROUNDS: usize = 20;
+/// An edge at which 1 − s v is below this holds ribs.
+const TOUCHING: f64 = 1e-4;
+/// Edges at which 1 − s v differs by less than this are one.
+const SAME: f64 = 1e-3;
 
 /// Goes on from a minimum in which ribs may cross to one in which they do not, and bounds the programme so; with the arc
-/// length where they still cross, if they do.
+/// length where the edges are not settled, if they are not: ribs cross there, or are held by an edge they do not reach.
 pub(super) fn keep_apart(
     assembly: &Assembly,
     search: &Search,
@@ -24,17 +31,48 @@ pub(super) fn keep_apart(
     mut solution: Solution<BeltPoint>,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> (Solution<BeltPoint>, Option<f64>) {
-    let crossing = |spine: &Spine| crossings(spine).first().map(|element| spine.u[*element]);
     for _ in 0..ROUNDS {
         let spine = assembly.spine(program, &solution.point);
-        if solution.outcome != Outcome::Converged || crossing(&spine).is_none() {
+        if solution.outcome != Outcome::Converged || unsettled(program, &spine).is_none() {
             return (solution, None);
         }
         take_further_edges(program, &spine);
         solution = search.again(program, solution, proceed);
     }
-    let crossing = crossing(&assembly.spine(program, &solution.point));
-    (solution, crossing)
+    let spine = assembly.spine(program, &solution.point);
+    let unsettled = unsettled(program, &spine).map(|element| spine.u[element]);
+    (solution, unsettled)
+}
+
+/// The first element of which ribs cross, or are held by an edge that they no longer reach: taken for another shape, it
+/// would bound this one for nothing.
+fn unsettled(program: &BeltProgram, spine: &Spine) -> Option<usize> {
+    let crossing = crossings(spine).first().copied();
+    crossing.or_else(|| {
+        let is_bounded = |(_, element): (usize, &Element)| element.further != [None; FURTHER];
+        if !program.elements().any(is_bounded) {
+            return None;
+        }
+        let mut reached = further_edges(spine).into_iter();
+        let held_for_nothing = |(k, edges): &(usize, [Option<Edge>; FURTHER])| {
+            let Piece::Strip(element) = &program.pieces[*k] else {
+                return false;
+            };
+            let (slope, s) = element
+                .strips()
+                .measure([spine.rib_slope[*k], spine.rib_slope[k + 1]]);
+            let slack = |edge: &Edge| edge.slack(slope, s);
+            let scaled = |edge: &Edge| edge.scaled(1.0 / spine.length());
+            element.further.iter().zip(edges).any(|(taken, reached)| {
+                let taken = taken.as_ref().map_or(f64::INFINITY, slack);
+                let reached = reached
+                    .as_ref()
+                    .map_or(f64::INFINITY, |edge| slack(&scaled(edge)));
+                taken < TOUCHING && reached > SAME + taken
+            })
+        };
+        reached.find(held_for_nothing).map(|(k, _)| k)
+    })
 }
 
 /// Bounds every element by the edges that its ribs reach past those of their own stretch.

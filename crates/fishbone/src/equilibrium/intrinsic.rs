@@ -154,7 +154,7 @@ fn judge(
         Outcome::Converged if let Some(u) = crossing => (
             Status::NotConverged,
             format!(
-                "ribs cross on the board at u = {}, beside a bend that they reach past; try another solver.bulge, a \
+                "ribs beside a bend, at u = {}, could not be kept apart on the board; try another solver.bulge, a \
                  narrower board or a gentler bend",
                 number(u)
             ),

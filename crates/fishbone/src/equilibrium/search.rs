@@ -95,7 +95,7 @@ impl Search {
             best = better(best, |_| self.by_way_of_another(program, &start, proceed));
         }
         for (slope, wave) in [(SLANT, 0.0), (-SLANT, 0.0), (0.0, 1.0), (0.0, 2.0)] {
-            if is_flat_under_load(program, &best.point) {
+            if best.outcome != Outcome::Interrupted && is_flat_under_load(program, &best.point) {
                 best = better(best, |best| {
                     let buckled = buckle(program, &best.point, slope, wave, &self.bulge);
                     self.minimise(program, buckled, WARM, proceed)
