@@ -3,11 +3,13 @@
 //! An element joins two nodes; its four unknowns are `(bend₀, slope₀, bend₁, slope₁)`, linear in between. Were pose
 //! and energy taken at different points, a node-to-node zigzag of the unknowns would cost one of them nothing.
 
+pub mod block;
+
 use crate::energy::{Curl, EnergyModel, Term};
-use crate::lie::{Coefficients, Pose, Twist, gauss_points, hat, magnus};
+use crate::lie::{Pose, Twist, gauss_points, magnus};
 use crate::solver::BOUNDS;
 use crate::strip::{Across, Edge, FURTHER, SlopeJet, Strips};
-use nalgebra::{Matrix2, Matrix2x4, Matrix3, Matrix3x4, Matrix4, Vector3, Vector4};
+use nalgebra::{Matrix2, Matrix2x4, Matrix4, Vector3, Vector4};
 
 /// Torsion ω_η = −β ω_ζ.
 ///
@@ -47,21 +49,6 @@ pub struct Element {
     pub curl: Curl,
     /// Edges of the board, besides those of its own stretch, before which its ribs must not cross either.
     pub further: [Option<Edge>; FURTHER],
-}
-
-/// An increment with its derivatives by the four unknowns.
-#[derive(Debug, Clone, Copy)]
-pub struct IncrementJet {
-    /// The increment itself.
-    pub value: Pose,
-    /// Derivative of the displacement, 3×4.
-    pub position_by_fields: Matrix3x4<f64>,
-    /// Derivative of the rotation as body twist at the second node, 3×4.
-    pub rotation_by_fields: Matrix3x4<f64>,
-    gauss: GaussFields,
-    step: Twist,
-    rotation_by_gauss: Matrix3x4<f64>,
-    coefficients: Coefficients,
 }
 
 /// A function of the four unknowns with its derivatives.
@@ -144,15 +131,6 @@ impl GaussFields {
         }
     }
 
-    /// Derivative of (bend₁, slope₁, bend₂, slope₂) at the Gauss points by the nodal unknowns.
-    fn by_nodes() -> Matrix4<f64> {
-        let [first, second] = gauss_points().map(fields_by_nodes);
-        let mut both = Matrix4::zeros();
-        both.fixed_rows_mut::<2>(0).copy_from(&first);
-        both.fixed_rows_mut::<2>(2).copy_from(&second);
-        both
-    }
-
     /// Twists per unit length at the two Gauss points.
     fn strains(&self, geodesic: f64) -> [Twist; 2] {
         [0, 1].map(|i| strain(geodesic, self.bend[i], self.slope[i]))
@@ -162,14 +140,6 @@ impl GaussFields {
     fn step(&self, length: f64, geodesic: f64) -> Twist {
         let [first, second] = self.strains(geodesic);
         magnus(&first, &second, length)
-    }
-
-    /// Derivative of the body rates at Gauss point `i` by the bend and by the slope there.
-    fn rates_by_own(&self, i: usize) -> [Vector3<f64>; 2] {
-        [
-            Vector3::new(0.0, -self.slope[i], 1.0),
-            Vector3::new(0.0, -self.bend[i], 0.0),
-        ]
     }
 }
 
@@ -203,53 +173,6 @@ impl Element {
         increment(self.length, self.geodesic, fields)
     }
 
-    /// Pose increment with its derivatives.
-    pub fn increment_jet(&self, fields: &Vector4<f64>) -> IncrementJet {
-        let gauss = GaussFields::at(fields);
-        let step = gauss.step(self.length, self.geodesic);
-        let (phi, rho) = (&step.rotation, &step.translation);
-        let c = Coefficients::at(phi.norm_squared());
-        let rotation_by_gauss = self.rotation_by_gauss(&gauss);
-        let rotation_by_fields = rotation_by_gauss * GaussFields::by_nodes();
-        let jacobian = c.left_jacobian(phi);
-        IncrementJet {
-            value: Pose {
-                position: left_jacobian_times(&c, phi, rho),
-                frame: c.exp(phi),
-            },
-            position_by_fields: left_jacobian_derivative(&c, phi, rho) * rotation_by_fields
-                + jacobian * self.translation_by_gauss() * GaussFields::by_nodes(),
-            rotation_by_fields: jacobian.tr_mul(&rotation_by_fields),
-            gauss,
-            step,
-            rotation_by_gauss,
-            coefficients: c,
-        }
-    }
-
-    /// Second derivative, by the four unknowns, of `force · displacement + moment · rotation`, where the rotation is
-    /// the rotation vector from the present second frame.
-    pub fn increment_hessian(
-        &self,
-        jet: &IncrementJet,
-        force: &Vector3<f64>,
-        moment: &Vector3<f64>,
-    ) -> Matrix4<f64> {
-        let (c, phi, rho) = (&jet.coefficients, &jet.step.rotation, &jet.step.translation);
-        let by_rotation = left_jacobian_times(c, phi, moment)
-            + left_jacobian_derivative(c, phi, rho).transpose() * force;
-        let curvature = symmetric_part(&left_jacobian_derivative(c, phi, moment))
-            + displacement_curvature(c, phi, rho, force);
-        let mixed = -left_jacobian_derivative(c, &-phi, force);
-        let jacobian = &jet.rotation_by_gauss;
-        let to_nodes = GaussFields::by_nodes();
-        let mut hessian = jacobian.transpose() * curvature * jacobian;
-        let cross = jacobian.transpose() * mixed.transpose() * self.translation_by_gauss();
-        hessian += cross + cross.transpose();
-        hessian += self.rotation_hessian(&jet.gauss, &by_rotation);
-        to_nodes.transpose() * hessian * to_nodes
-    }
-
     /// Energy, without derivatives.
     pub fn energy(&self, model: EnergyModel, fields: &Vector4<f64>) -> f64 {
         let gauss = GaussFields::at(fields);
@@ -265,29 +188,26 @@ impl Element {
         at(0) + at(1)
     }
 
-    /// Energy with its derivatives.
-    pub fn energy_jet(&self, model: EnergyModel, fields: &Vector4<f64>) -> Jet {
-        let gauss = GaussFields::at(fields);
-        let bending = self.integral(&gauss, |bend, slope| model.bending(bend, slope));
-        let across = model.knows_width().then(|| {
-            self.strips()
-                .across_jets([fields[1], fields[3]])
-                .map(Jet::from)
-        });
-        let mut sum = match &across {
-            Some(across) => bending.times(&across.bending),
-            None => bending,
-        };
-        if self.curl.bend != 0.0 {
-            let mixed = self.integral(&gauss, |bend, slope| model.mixed(bend, slope, &self.curl));
-            let natural = self.integral(&gauss, |_, slope| model.natural(slope, &self.curl));
-            for (term, factor) in [
-                (mixed, across.map(|across| across.length)),
-                (natural, across.map(|across| across.area)),
-            ] {
-                sum.add(&factor.map_or(term, |factor| term.times(&factor)));
-            }
+    /// What the width makes of the terms of the energy, with derivatives.
+    pub fn across_jets(&self, model: EnergyModel, fields: &Vector4<f64>) -> Across<SlopeJet> {
+        match model.knows_width() {
+            true => self.strips().across_jets([fields[1], fields[3]]),
+            false => Across::PLAIN.map(SlopeJet::constant),
         }
+    }
+
+    /// The part of the energy that the natural bend adds, with its derivatives.
+    pub fn curl_jet(
+        &self,
+        model: EnergyModel,
+        fields: &Vector4<f64>,
+        across: &Across<SlopeJet>,
+    ) -> Jet {
+        let gauss = GaussFields::at(fields);
+        let mixed = self.integral(&gauss, |bend, slope| model.mixed(bend, slope, &self.curl));
+        let natural = self.integral(&gauss, |_, slope| model.natural(slope, &self.curl));
+        let mut sum = mixed.times(&Jet::from(across.length));
+        sum.add(&natural.times(&Jet::from(across.area)));
         sum
     }
 
@@ -300,57 +220,6 @@ impl Element {
         }
         sum
     }
-
-    /// Weight of the sum and of the commutator in the Magnus step.
-    fn magnus_weights(&self) -> (f64, f64) {
-        (
-            0.5 * self.length,
-            3f64.sqrt() / 12.0 * self.length * self.length,
-        )
-    }
-
-    /// Derivative of the rotation vector by the unknowns at the Gauss points.
-    fn rotation_by_gauss(&self, gauss: &GaussFields) -> Matrix3x4<f64> {
-        let [first, second] = gauss.strains(self.geodesic).map(|twist| twist.rotation);
-        let (half, weight) = self.magnus_weights();
-        let [a, b] = gauss
-            .rates_by_own(0)
-            .map(|d| half * d + weight * d.cross(&second));
-        let [c, d] = gauss
-            .rates_by_own(1)
-            .map(|d| half * d + weight * first.cross(&d));
-        Matrix3x4::from_columns(&[a, b, c, d])
-    }
-
-    /// Second derivative of `by_rotation · rotation` by the unknowns at the Gauss points.
-    fn rotation_hessian(&self, gauss: &GaussFields, by_rotation: &Vector3<f64>) -> Matrix4<f64> {
-        let [first, second] = gauss.strains(self.geodesic).map(|twist| twist.rotation);
-        let (half, weight) = self.magnus_weights();
-        let bilinear = -Vector3::y();
-        let mut hessian = Matrix4::zeros();
-        let mut set = |i: usize, j: usize, value: Vector3<f64>| {
-            hessian[(i, j)] = by_rotation.dot(&value);
-            hessian[(j, i)] = hessian[(i, j)];
-        };
-        set(0, 1, half * bilinear + weight * bilinear.cross(&second));
-        set(2, 3, half * bilinear + weight * first.cross(&bilinear));
-        for (i, left) in gauss.rates_by_own(0).iter().enumerate() {
-            for (j, right) in gauss.rates_by_own(1).iter().enumerate() {
-                set(i, 2 + j, weight * left.cross(right));
-            }
-        }
-        hessian
-    }
-
-    /// Derivative of the translation part of the Magnus step by the unknowns at the Gauss points: only the
-    /// difference of the bends enters.
-    fn translation_by_gauss(&self) -> Matrix3x4<f64> {
-        let (_, weight) = self.magnus_weights();
-        let mut derivative = Matrix3x4::zeros();
-        derivative[(0, 0)] = -weight;
-        derivative[(0, 2)] = weight;
-        derivative
-    }
 }
 
 /// Derivative of (bend, slope) at parameter t of an element by the nodal unknowns.
@@ -359,53 +228,12 @@ fn fields_by_nodes(t: f64) -> Matrix2x4<f64> {
     Matrix2x4::from_columns(&[own.column(0), own.column(1), next.column(0), next.column(1)])
 }
 
-/// V(φ) a, with the left Jacobian V of SO(3).
-fn left_jacobian_times(c: &Coefficients, phi: &Vector3<f64>, a: &Vector3<f64>) -> Vector3<f64> {
-    let once = phi.cross(a);
-    a + c.cosine[0] * once + c.cubic[0] * phi.cross(&once)
-}
-
-/// Derivative of V(φ) a by φ.
-fn left_jacobian_derivative(
-    c: &Coefficients,
-    phi: &Vector3<f64>,
-    a: &Vector3<f64>,
-) -> Matrix3<f64> {
-    let once = phi.cross(a);
-    let twice = phi.cross(&once);
-    2.0 * (c.cosine[1] * once + c.cubic[1] * twice) * phi.transpose() - c.cosine[0] * hat(a)
-        + c.cubic[0]
-            * (phi.dot(a) * Matrix3::identity() + phi * a.transpose() - 2.0 * a * phi.transpose())
-}
-
-/// Second derivative of `force · V(φ) ρ` by φ.
-fn displacement_curvature(
-    c: &Coefficients,
-    phi: &Vector3<f64>,
-    rho: &Vector3<f64>,
-    force: &Vector3<f64>,
-) -> Matrix3<f64> {
-    let linear = rho.cross(force);
-    let form = symmetric_part(&(force * rho.transpose())) - force.dot(rho) * Matrix3::identity();
-    let image = form * phi;
-    let (first, second) = (phi.dot(&linear), phi.dot(&image));
-    let slope = 2.0 * (c.cosine[1] * linear + 2.0 * c.cubic[1] * image);
-    4.0 * (c.cosine[2] * first + c.cubic[2] * second) * phi * phi.transpose()
-        + 2.0 * (c.cosine[1] * first + c.cubic[1] * second) * Matrix3::identity()
-        + phi * slope.transpose()
-        + slope * phi.transpose()
-        + 2.0 * c.cubic[0] * form
-}
-
-/// ½ (M + Mᵀ).
-fn symmetric_part(m: &Matrix3<f64>) -> Matrix3<f64> {
-    0.5 * (m + m.transpose())
-}
-
 #[cfg(test)]
 mod tests {
+    use super::block::{Block, LANES};
     use super::*;
-    use nalgebra::{SMatrix, SVector};
+    use crate::solver::chain::{ByControl, NodeVector, Stage};
+    use nalgebra::{Matrix3, SMatrix, SVector};
     use num_dual::{DualNum, hessian};
 
     /// The element over again in any scalar: truncated exponential series instead of closed forms.
@@ -475,26 +303,52 @@ mod tests {
         )
     }
 
-    /// force · p(w) + moment · log(E(w₀)ᵀ E(w)), the logarithm to second order in w − w₀ by the skew part.
+    /// `force` and `moment` on the twist X of `M(w) = exp(X) M(w₀)`, to second order in w − w₀.
     fn work<D: DualNum<Primitive = f64> + Copy>(
-        h: f64,
-        geodesic: f64,
+        element: &Element,
         w: [D; 4],
-        at: &Matrix3<f64>,
+        at: &Pose,
         force: &Vector3<f64>,
         moment: &Vector3<f64>,
     ) -> D {
-        let (e, p) = displacement_and_rotation(h, geodesic, w);
-        let relative =
-            |i: usize, j: usize| (0..3).fold(D::from(0.0), |s, k| s + e[k][j] * at[(k, i)]);
-        let skew = [
-            (relative(2, 1) - relative(1, 2)) * 0.5,
-            (relative(0, 2) - relative(2, 0)) * 0.5,
-            (relative(1, 0) - relative(0, 1)) * 0.5,
+        let (e, p) = displacement_and_rotation(element.length, element.geodesic, w);
+        let turned =
+            |i: usize, j: usize| (0..3).fold(D::from(0.0), |s, k| s + e[i][k] * at.frame[(j, k)]);
+        let turn = [
+            (turned(2, 1) - turned(1, 2)) * 0.5,
+            (turned(0, 2) - turned(2, 0)) * 0.5,
+            (turned(1, 0) - turned(0, 1)) * 0.5,
+        ];
+        let shift: [D; 3] = std::array::from_fn(|i| {
+            p[i] - (0..3).fold(D::from(0.0), |s, j| s + turned(i, j) * at.position[j])
+        });
+        let back = [
+            turn[1] * shift[2] - turn[2] * shift[1],
+            turn[2] * shift[0] - turn[0] * shift[2],
+            turn[0] * shift[1] - turn[1] * shift[0],
         ];
         (0..3).fold(D::from(0.0), |s, i| {
-            s + p[i] * force[i] + skew[i] * moment[i]
+            s + (shift[i] - back[i] * 0.5) * force[i] + turn[i] * moment[i]
         })
+    }
+
+    /// Bending energy by its definition, in any scalar.
+    fn energy<D: DualNum<Primitive = f64> + Copy>(
+        element: &Element,
+        model: EnergyModel,
+        w: [D; 4],
+    ) -> D {
+        let across = match model {
+            EnergyModel::Wunderlich => element.strips().across([w[1], w[3]]),
+            _ => Across::PLAIN.map(D::from),
+        };
+        let mut sum = D::from(0.0);
+        for (t, r) in gauss_points().into_iter().zip(element.rigidity) {
+            let bend = w[0] * (1.0 - t) + w[2] * t;
+            let slope = w[1] * (1.0 - t) + w[3] * t;
+            sum += model.value(bend, slope, &element.curl, &across) * (0.5 * element.length * r);
+        }
+        sum
     }
 
     fn cases() -> Vec<(Element, Vector4<f64>)> {
@@ -534,73 +388,156 @@ mod tests {
         assert!((a - b).amax() <= tolerance * scale, "{a}{b}");
     }
 
+    const MODELS: [EnergyModel; 3] = [
+        EnergyModel::Fishbone,
+        EnergyModel::Sadowsky,
+        EnergyModel::Wunderlich,
+    ];
+
     #[test]
-    fn test_increment_and_its_derivatives_agree_with_automatic_differentiation() {
-        let (force, moment) = (Vector3::new(3.0, -2.0, 1.0), Vector3::new(0.5, 1.5, -0.7));
+    fn test_increment_agrees_with_the_exponential_series() {
         for (element, w) in cases() {
-            let jet = element.increment_jet(&w);
+            let motion = element.increment(&w);
             let (e, p) = displacement_and_rotation(
                 element.length,
                 element.geodesic,
                 [w[0], w[1], w[2], w[3]],
             );
-            assert_close(jet.value.position, Vector3::from(p), 1e-14);
-            assert_close(jet.value.frame, Matrix3::from_fn(|i, j| e[i][j]), 1e-14);
-            let at = jet.value.frame;
-            let (_, gradient, second) = hessian(
-                |x: SVector<num_dual::Dual2SVec64<4>, 4>| {
-                    work(
-                        element.length,
-                        element.geodesic,
-                        [x[0], x[1], x[2], x[3]],
-                        &at,
-                        &force,
-                        &moment,
-                    )
-                },
-                &w,
-            );
-            let by_hand = jet.position_by_fields.transpose() * force
-                + jet.rotation_by_fields.transpose() * moment;
-            assert_close(by_hand, gradient, 1e-12);
-            assert_close(
-                element.increment_hessian(&jet, &force, &moment),
-                second,
-                1e-12,
-            );
+            assert_close(motion.position, Vector3::from(p), 1e-14);
+            assert_close(motion.frame, Matrix3::from_fn(|i, j| e[i][j]), 1e-14);
         }
     }
 
+    /// A full block of cases, each at a pose and under a wrench of its own.
     #[test]
-    fn test_energy_derivatives_agree_with_automatic_differentiation() {
-        for model in [
-            EnergyModel::Fishbone,
-            EnergyModel::Sadowsky,
-            EnergyModel::Wunderlich,
-        ] {
+    fn test_derivatives_agree_with_automatic_differentiation() {
+        let first = Pose {
+            frame: crate::lie::exp(&Vector3::new(0.3, -0.8, 1.1)),
+            position: Vector3::new(0.4, -0.2, 0.7),
+        };
+        let wrench = NodeVector::from_column_slice(&[3.0, -2.0, 1.0, 0.5, 1.5, -0.7, 0.0, 0.0]);
+        for model in MODELS {
+            for some in cases().chunks(LANES) {
+                let mut block = Block::default();
+                for (lane, (element, w)) in some.iter().enumerate() {
+                    let across = element.across_jets(model, w).bending;
+                    let second = first * element.increment(w);
+                    block.set(lane, element, w, &across, [&first, &second], &wrench);
+                }
+                block.differentiate(model);
+                for (lane, (element, w)) in some.iter().enumerate() {
+                    check_lane(&block, lane, element, w, model, &first, &wrench);
+                }
+            }
+        }
+    }
+
+    fn check_lane(
+        block: &Block,
+        lane: usize,
+        element: &Element,
+        w: &Vector4<f64>,
+        model: EnergyModel,
+        first: &Pose,
+        wrench: &NodeVector,
+    ) {
+        let motion = element.increment(w);
+        let force: Vector3<f64> = wrench.fixed_rows::<3>(0).into_owned();
+        let about_first = wrench.fixed_rows::<3>(3) - first.position.cross(&force);
+        let (force_here, moment_here) =
+            (first.frame.tr_mul(&force), first.frame.tr_mul(&about_first));
+        let unloaded = Element {
+            curl: Curl::default(),
+            ..*element
+        };
+        let (_, gradient, second) = hessian(
+            |x: SVector<num_dual::Dual2SVec64<4>, 4>| {
+                let x = [x[0], x[1], x[2], x[3]];
+                work(element, x, &motion, &force_here, &moment_here) + energy(&unloaded, model, x)
+            },
+            w,
+        );
+        assert_close(block.gradient(lane), gradient, 1e-11);
+        assert_close(block.hessian(lane), second, 1e-10);
+        let mut stage = Stage::zero();
+        block.carry(lane, &mut stage);
+        for i in 0..3 {
+            // The twist by a unit of each field is the gradient of the work of a unit force or moment.
+            for (row, force, moment) in [
+                (i, Vector3::ith(i, 1.0), Vector3::zeros()),
+                (3 + i, Vector3::zeros(), Vector3::ith(i, 1.0)),
+            ] {
+                let about_first = moment - first.position.cross(&force);
+                let seen = [force, about_first].map(|a| first.frame.tr_mul(&a));
+                let (_, by_fields) = num_dual::gradient(
+                    |x: SVector<num_dual::DualSVec64<4>, 4>| {
+                        work(
+                            element,
+                            [x[0], x[1], x[2], x[3]],
+                            &motion,
+                            &seen[0],
+                            &seen[1],
+                        )
+                    },
+                    w,
+                );
+                for (column, expected) in by_fields.iter().enumerate() {
+                    let by = match column {
+                        0 | 1 => &stage.growth_by_first,
+                        _ => &stage.growth_by_second,
+                    };
+                    assert!((by[(row, column % 2)] - expected).abs() < 1e-12);
+                }
+            }
+        }
+        assert_close(
+            mixed_by_bracket(&stage.growth_by_first, wrench),
+            stage.state_first,
+            1e-12,
+        );
+        assert_close(
+            mixed_by_bracket(&stage.growth_by_second, wrench),
+            stage.state_second,
+            1e-12,
+        );
+    }
+
+    /// Half the work of the wrench on the bracket of a unit twist and each column.
+    fn mixed_by_bracket(growth: &ByControl, wrench: &NodeVector) -> ByControl {
+        let twist =
+            |column: &NodeVector| Twist::from_vector(&column.fixed_rows::<6>(0).into_owned());
+        ByControl::from_fn(|row, column| match row {
+            0..6 => {
+                let grown = twist(&growth.column(column).into_owned());
+                let unit = twist(&NodeVector::ith(row, 1.0));
+                let bracket = crate::lie::bracket(&unit, &grown).to_vector();
+                0.5 * bracket.dot(&wrench.fixed_rows::<6>(0))
+            }
+            _ => 0.0,
+        })
+    }
+
+    #[test]
+    fn test_energy_of_a_curled_element_agrees_with_automatic_differentiation() {
+        for model in MODELS {
             for (element, w) in cases() {
+                let uncurled = Element {
+                    curl: Curl::default(),
+                    ..element
+                };
                 let (value, gradient, second) = hessian(
                     |x: SVector<num_dual::Dual2SVec64<4>, 4>| {
-                        let across = match model {
-                            EnergyModel::Wunderlich => element.strips().across([x[1], x[3]]),
-                            _ => Across::PLAIN.map(num_dual::Dual2SVec64::from),
-                        };
-                        let mut sum = x[0] * 0.0;
-                        for (t, r) in gauss_points().into_iter().zip(element.rigidity) {
-                            let bend = x[0] * (1.0 - t) + x[2] * t;
-                            let slope = x[1] * (1.0 - t) + x[3] * t;
-                            sum += model.value(bend, slope, &element.curl, &across)
-                                * (0.5 * element.length * r);
-                        }
-                        sum
+                        let x = [x[0], x[1], x[2], x[3]];
+                        energy(&element, model, x) - energy(&uncurled, model, x)
                     },
                     &w,
                 );
-                let jet = element.energy_jet(model, &w);
-                assert!((jet.value - value).abs() <= 1e-13 * value.abs());
+                let jet = element.curl_jet(model, &w, &element.across_jets(model, &w));
+                assert!((jet.value - value).abs() <= 1e-12 * value.abs().max(1e-3));
                 assert_close(jet.gradient, gradient, 1e-11);
                 assert_close(jet.hessian, second, 1e-10);
-                assert!((element.energy(model, &w) - value).abs() <= 1e-13 * value.abs());
+                let whole = energy(&element, model, [w[0], w[1], w[2], w[3]]);
+                assert!((element.energy(model, &w) - whole).abs() <= 1e-13 * whole.abs());
             }
         }
     }

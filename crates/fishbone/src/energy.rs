@@ -85,6 +85,7 @@ impl EnergyModel {
     }
 
     /// The term in κ₁² at unit rigidity, before the width's factor.
+    #[inline(always)]
     pub fn bending(self, bend: f64, slope: f64) -> Term {
         let c = self.slope_factor(slope);
         let half = 0.5 * bend * bend;
@@ -132,6 +133,7 @@ impl EnergyModel {
     }
 
     /// Power of 1+β² in the term in κ₁².
+    #[inline(always)]
     fn exponent(self) -> f64 {
         match self {
             Self::Fishbone => 2.5,
@@ -140,6 +142,7 @@ impl EnergyModel {
     }
 
     /// (1+β²)^p and its first two derivatives by β.
+    #[inline(always)]
     fn slope_factor(self, slope: f64) -> [f64; 3] {
         let p = self.exponent();
         let t = 1.0 + slope * slope;

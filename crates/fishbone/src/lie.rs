@@ -204,6 +204,7 @@ pub fn magnus(twist_1: &Twist, twist_2: &Twist, h: f64) -> Twist {
 }
 
 /// Where the two Gauss points of an element lie, as fractions of its length.
+#[inline(always)]
 pub fn gauss_points() -> [f64; 2] {
     let offset = 3f64.sqrt() / 6.0;
     [0.5 - offset, 0.5 + offset]
@@ -215,6 +216,28 @@ fn block_triangular(diagonal: &Matrix3<f64>, upper: &Matrix3<f64>) -> Matrix6<f6
     block.fixed_view_mut::<3, 3>(3, 3).copy_from(diagonal);
     block.fixed_view_mut::<3, 3>(0, 3).copy_from(upper);
     block
+}
+
+/// Derivative of `force · x` by a twist, world axes about the origin, that carries the point x along: the force and its
+/// moment about the origin.
+pub fn carried_gradient(point: &Vector3<f64>, force: &Vector3<f64>) -> Vector6<f64> {
+    let moment = point.cross(force);
+    Vector6::new(force.x, force.y, force.z, moment.x, moment.y, moment.z)
+}
+
+/// Second derivative of `force · x` by the twist.
+pub fn carried_hessian(point: &Vector3<f64>, force: &Vector3<f64>) -> Matrix6<f64> {
+    let mut hessian = Matrix6::zeros();
+    let mixed = 0.5 * hat(force);
+    hessian.fixed_view_mut::<3, 3>(0, 3).copy_from(&mixed);
+    hessian
+        .fixed_view_mut::<3, 3>(3, 0)
+        .copy_from(&mixed.transpose());
+    let outer = force * point.transpose();
+    hessian
+        .fixed_view_mut::<3, 3>(3, 3)
+        .copy_from(&(0.5 * (outer + outer.transpose()) - force.dot(point) * Matrix3::identity()));
+    hessian
 }
 
 /// The matrix `[a]×` with `[a]× b = a × b`.
@@ -285,11 +308,24 @@ impl Coefficients {
     /// They are the Stumpff functions c₁, c₂, c₃, and their derivatives follow from c₁ … c₇ without a division:
     /// `2 c_n' = n c_{n+2} − c_{n+1}`.
     pub fn at(t: f64) -> Self {
-        let c = stumpff(t);
+        match t < SERIES_BELOW {
+            true => Self::near(t),
+            false => Self::of(&stumpff_closed(t)),
+        }
+    }
+
+    /// The same at t ≤ 1, without a branch.
+    #[inline(always)]
+    pub fn near(t: f64) -> Self {
+        Self::of(&stumpff_by_series(t))
+    }
+
+    #[inline(always)]
+    fn of(c: &[f64; 8]) -> Self {
         Self {
-            sine: with_derivatives(&c, 1),
-            cosine: with_derivatives(&c, 2),
-            cubic: with_derivatives(&c, 3),
+            sine: with_derivatives(c, 1),
+            cosine: with_derivatives(c, 2),
+            cubic: with_derivatives(c, 3),
         }
     }
 
@@ -305,6 +341,7 @@ impl Coefficients {
 }
 
 /// c_n, c_n' and c_n'' from the table c₀ … c₇.
+#[inline(always)]
 fn with_derivatives(c: &[f64; 8], n: usize) -> [f64; 3] {
     let m = n as f64;
     let first = 0.5 * (m * c[n + 2] - c[n + 1]);
@@ -328,39 +365,28 @@ const INVERSE_FACTORIAL: [f64; 8] = [
     1.0 / 5040.0,
 ];
 
-/// The Stumpff functions c_n(t) = Σ (−t)^k / (2k + n)! for n = 0 … 7.
-fn stumpff(t: f64) -> [f64; 8] {
-    if t < SERIES_BELOW {
-        stumpff_by_series(t)
-    } else {
-        stumpff_closed(t)
-    }
-}
-
-/// c₆ and c₇ by series, the others by c_n = 1/n! − t c_{n+2}, which is stable downwards.
+/// The Stumpff functions c_n(t) = Σ (−t)^k / (2k + n)! for n = 0 … 7 and t ≤ 1: c₆ and c₇ by their series, the others by
+/// c_n = 1/n! − t c_{n+2}, which is stable downwards.
+#[inline(always)]
 fn stumpff_by_series(t: f64) -> [f64; 8] {
     let mut c = INVERSE_FACTORIAL;
-    if t < FEW_TERMS_BELOW {
-        (c[6], c[7]) = (series::<5>(t, &SIXTH), series::<5>(t, &SEVENTH));
-    } else {
-        (c[6], c[7]) = (series::<9>(t, &SIXTH), series::<9>(t, &SEVENTH));
-    }
+    (c[6], c[7]) = (series(t, &SIXTH), series(t, &SEVENTH));
     for n in (0..6).rev() {
         c[n] -= t * c[n + 2];
     }
     c
 }
 
-/// Below this t five terms leave less than 1e-18, up to t = 1 nine.
-const FEW_TERMS_BELOW: f64 = 0.05;
-const SIXTH: [f64; 9] = series_coefficients(6);
-const SEVENTH: [f64; 9] = series_coefficients(7);
+/// Terms that leave less than 1e-18 at t = 1.
+const TERMS: usize = 9;
+const SIXTH: [f64; TERMS] = series_coefficients(6);
+const SEVENTH: [f64; TERMS] = series_coefficients(7);
 
 /// (−1)^k / (2k + n)!
-const fn series_coefficients(n: usize) -> [f64; 9] {
-    let mut coefficients = [INVERSE_FACTORIAL[n]; 9];
+const fn series_coefficients(n: usize) -> [f64; TERMS] {
+    let mut coefficients = [INVERSE_FACTORIAL[n]; TERMS];
     let mut k = 1;
-    while k < 9 {
+    while k < TERMS {
         let j = (n + 2 * k) as f64;
         coefficients[k] = -coefficients[k - 1] / (j * (j - 1.0));
         k += 1;
@@ -368,10 +394,11 @@ const fn series_coefficients(n: usize) -> [f64; 9] {
     coefficients
 }
 
-/// The first terms of a power series.
-fn series<const TERMS: usize>(t: f64, coefficients: &[f64; 9]) -> f64 {
-    let terms = coefficients[..TERMS].iter().rev();
-    terms.fold(0.0, |sum, coefficient| sum * t + coefficient)
+/// A power series.
+#[inline(always)]
+fn series(t: f64, coefficients: &[f64; TERMS]) -> f64 {
+    let [a, b, c, d, e, f, g, h, i] = *coefficients;
+    a + t * (b + t * (c + t * (d + t * (e + t * (f + t * (g + t * (h + t * i)))))))
 }
 
 /// sin and cos, the others by c_{n+2} = (1/n! − c_n) / t.

@@ -12,14 +12,15 @@ pub use link::{NodeLink, Tie};
 pub use load::{DeadForce, NodeLoad};
 pub use support::{Hold, NodeSupport};
 
-use crate::element::{Element, IncrementJet, Jet};
+use crate::element::Element;
+use crate::element::block::{Block, LANES};
 use crate::energy::EnergyModel;
-use crate::lie::{Pose, hat};
-use crate::solver::chain::{NodeVector, Stage};
+use crate::lie::{Pose, Twist};
+use crate::solver::chain::NodeVector;
 use crate::solver::{BOUNDS, Bounds, Linearisation, Program, Rows, Values};
 use crate::spine::turn;
 use crate::strip::FURTHER;
-use nalgebra::{Matrix3, Matrix4, Rotation3, UnitQuaternion, Vector2, Vector3, Vector4};
+use nalgebra::{Matrix4, Matrix6, UnitQuaternion, Vector2, Vector3, Vector4, Vector6};
 
 /// What joins a node to the next.
 #[expect(
@@ -70,13 +71,6 @@ pub struct BeltPoint {
     pub fields: Vec<Vector2<f64>>,
     /// Pose of every node; the first is an unknown, the others follow from it and the fields.
     pub poses: Vec<Pose>,
-}
-
-/// What acts on a node from beyond: derivative of all work by the node's position and frame.
-#[derive(Debug, Clone, Copy)]
-struct Adjoint {
-    force: Vector3<f64>,
-    moment: Vector3<f64>,
 }
 
 impl Piece {
@@ -336,8 +330,10 @@ impl BeltProgram {
         }
     }
 
-    /// Adds the derivatives of everything that acts at single nodes.
-    fn add_pulls(&self, point: &BeltPoint, multipliers: &[Rows], into: &mut [NodeVector]) {
+    /// Derivatives of all work by the twist of the belt from each node on: what acts at it and beyond.
+    ///
+    /// A wrench about the origin is the same all along the belt but where something acts.
+    fn wrenches(&self, point: &BeltPoint, multipliers: &[Rows], into: &mut [NodeVector]) {
         let (at_nodes, between) = multipliers.split_at(self.supports.len());
         for (support, rows) in self.supports.iter().zip(at_nodes) {
             into[support.node] += support.jacobian(&point.poses[support.node]).tr_mul(rows);
@@ -347,12 +343,29 @@ impl BeltProgram {
                 into[*node] += by_node.tr_mul(rows);
             }
         }
+        let mut add = |node: usize, load: &DeadForce| {
+            let mut wrench = into[node].fixed_rows_mut::<6>(0);
+            wrench += load.pull(&point.poses[node]);
+        };
+        self.for_each_load(&mut add);
+        for k in (0..self.pieces.len()).rev() {
+            let beyond: Vector6<f64> = into[k + 1].fixed_rows::<6>(0).into_owned();
+            let mut wrench = into[k].fixed_rows_mut::<6>(0);
+            wrench += beyond;
+        }
+    }
+
+    /// Dead forces and the weight of the pieces, each with its node.
+    fn for_each_load(&self, act: &mut dyn FnMut(usize, &DeadForce)) {
         for NodeLoad { node, load } in &self.loads {
-            let (force, moment) = load.pull(&point.poses[*node]);
-            let mut state = into[*node].fixed_rows_mut::<3>(0);
-            state += force;
-            let mut state = into[*node].fixed_rows_mut::<3>(3);
-            state += moment;
+            act(*node, load);
+        }
+        if !self.is_weightless() {
+            for (k, piece) in self.pieces.iter().enumerate() {
+                let [first, second] = load::weight(&self.weight, piece.length());
+                act(k, &first);
+                act(k + 1, &second);
+            }
         }
     }
 
@@ -364,23 +377,24 @@ impl BeltProgram {
         multipliers: &[Rows],
     ) -> Vec<(Vector3<f64>, Vector3<f64>)> {
         let last = self.pieces.len();
-        let mut pulls = vec![NodeVector::zeros(); last + 1];
-        self.add_pulls(point, multipliers, &mut pulls);
-        let mut adjoint = Adjoint::zero();
-        let mut internal = vec![(Vector3::zeros(), Vector3::zeros()); last + 1];
-        adjoint.add(&pulls[last]);
-        internal[last] = adjoint.on_part_before(&point.poses[last].frame);
-        for (k, piece) in self.pieces.iter().enumerate().rev() {
-            let pose = &point.poses[k];
-            let [first, second] = load::weight(&self.weight, piece.length());
-            adjoint.add_load(&second, &point.poses[k + 1]);
-            let motion = piece.motion(&Self::fields_of(&point.fields, k));
-            adjoint = adjoint.before(&pose.frame, &motion);
-            adjoint.add_load(&first, pose);
-            internal[k] = adjoint.on_part_before(&pose.frame);
-            adjoint.add(&pulls[k]);
-        }
-        internal
+        let mut wrenches = vec![NodeVector::zeros(); last + 1];
+        self.wrenches(point, multipliers, &mut wrenches);
+        let at = |k: usize| {
+            let beyond: Vector6<f64> = match wrenches.get(k + 1) {
+                Some(beyond) => beyond.fixed_rows::<6>(0) + self.pull_of_weight(k, 0, point),
+                None => wrenches[last].fixed_rows::<6>(0) - self.pull_of_weight(last - 1, 1, point),
+            };
+            let (force, moment) = (beyond.fixed_rows::<3>(0), beyond.fixed_rows::<3>(3));
+            let about_node = moment - point.poses[k].position.cross(&force);
+            (-force.into_owned(), -about_node)
+        };
+        (0..=last).map(at).collect()
+    }
+
+    /// Pull of the share of a piece's weight that acts at its first node, 0, or its second, 1.
+    fn pull_of_weight(&self, piece: usize, end: usize, point: &BeltPoint) -> Vector6<f64> {
+        let shares = load::weight(&self.weight, self.pieces[piece].length());
+        shares[end].pull(&point.poses[piece + end])
     }
 
     /// Force and moment of every support on the belt, world axes, about the support's point.
@@ -402,40 +416,6 @@ impl BeltProgram {
             .iter()
             .map(|rows| -rows.fixed_rows::<3>(0).into_owned())
             .collect()
-    }
-}
-
-impl Adjoint {
-    fn zero() -> Self {
-        Self {
-            force: Vector3::zeros(),
-            moment: Vector3::zeros(),
-        }
-    }
-
-    fn add(&mut self, by_node: &NodeVector) {
-        self.force += by_node.fixed_rows::<3>(0);
-        self.moment += by_node.fixed_rows::<3>(3);
-    }
-
-    fn add_load(&mut self, load: &DeadForce, pose: &Pose) {
-        let (force, moment) = load.pull(pose);
-        self.force += force;
-        self.moment += moment;
-    }
-
-    /// The same derivative by the pose at the piece's first node.
-    fn before(&self, frame: &Matrix3<f64>, motion: &Pose) -> Self {
-        let force = frame.tr_mul(&self.force);
-        Self {
-            force: self.force,
-            moment: motion.frame * self.moment + motion.position.cross(&force),
-        }
-    }
-
-    /// Force and moment in world axes on the part before the node.
-    fn on_part_before(&self, frame: &Matrix3<f64>) -> (Vector3<f64>, Vector3<f64>) {
-        (-self.force, -(frame * self.moment))
     }
 }
 
@@ -504,20 +484,18 @@ impl Program for BeltProgram {
         into: &mut Linearisation,
     ) {
         into.gradient.fill(NodeVector::zeros());
-        self.add_pulls(point, multipliers, &mut into.gradient);
+        self.wrenches(point, multipliers, &mut into.gradient);
         into.chain.first_free = self.free(0);
-        into.chain.last_state.fill(0.0);
-        let mut adjoint = Adjoint::zero();
-        for k in (0..=self.pieces.len()).rev() {
-            if k < self.pieces.len() {
-                self.linearise_piece(k, point, bounds, &mut adjoint, into);
+        self.linearise_elements(point, bounds, into);
+        for k in (0..self.pieces.len()).rev() {
+            into.chain.stages[k].free = self.free(k + 1);
+            if self.is_tied(k + 1) {
+                self.linearise_tie(k, point, bounds, into);
             }
-            adjoint.add(&into.gradient[k]);
-            into.gradient[k].fixed_rows_mut::<6>(0).fill(0.0);
         }
-        let mut start = into.gradient[0].fixed_rows_mut::<6>(0);
-        start.fixed_rows_mut::<3>(0).copy_from(&adjoint.force);
-        start.fixed_rows_mut::<3>(3).copy_from(&adjoint.moment);
+        for by_node in &mut into.gradient[1..] {
+            by_node.fixed_rows_mut::<6>(0).fill(0.0);
+        }
         self.linearise_conditions(point, multipliers, into);
     }
 
@@ -530,90 +508,75 @@ impl Program for BeltProgram {
                 into.fields[k][1] = slope;
             }
         }
-        let turn = Rotation3::new(length * step[0].fixed_rows::<3>(3));
-        into.poses[0] = Pose {
-            position: point.poses[0].position + length * step[0].fixed_rows::<3>(0),
-            frame: point.poses[0].frame * turn.matrix(),
-        };
+        let twist = Twist::from_vector(&(length * step[0].fixed_rows::<6>(0)));
+        into.poses[0] = Pose::exp(&twist) * point.poses[0];
     }
 }
 
 impl BeltProgram {
-    /// Derivatives of one piece, with what acts on its second node from beyond; moves that to the first node.
-    fn linearise_piece(
-        &self,
-        k: usize,
-        point: &BeltPoint,
-        bounds: &Bounds,
-        adjoint: &mut Adjoint,
-        into: &mut Linearisation,
-    ) {
-        let [first, second] = load::weight(&self.weight, self.pieces[k].length());
-        if !self.is_weightless() {
-            adjoint.add_load(&second, &point.poses[k + 1]);
-            add_state(into, k + 1, &second.hessian(&point.poses[k + 1]));
-        }
-        let pose = &point.poses[k];
-        let motion = match &self.pieces[k] {
-            Piece::Strip(element) => {
-                self.linearise_element(k, element, point, &bounds[k], adjoint, into)
+    /// Derivatives of the elements, block by block; the gradient holds the wrench at every node.
+    fn linearise_elements(&self, point: &BeltPoint, bounds: &Bounds, into: &mut Linearisation) {
+        let mut block = Block::default();
+        let mut members = [0; LANES];
+        let mut elements = self.elements().peekable();
+        while elements.peek().is_some() {
+            let mut count = 0;
+            for (lane, (k, element)) in elements.by_ref().take(LANES).enumerate() {
+                let fields = Self::fields_of(&point.fields, k);
+                let across = element.across_jets(self.model, &fields).bending;
+                let poses = [&point.poses[k], &point.poses[k + 1]];
+                block.set(
+                    lane,
+                    element,
+                    &fields,
+                    &across,
+                    poses,
+                    &into.gradient[k + 1],
+                );
+                members[lane] = k;
+                count = lane + 1;
             }
-            piece @ (Piece::Rigid { .. } | Piece::Joint { .. }) => {
-                let motion = piece.motion(&Vector4::zeros());
-                let force = pose.frame.tr_mul(&adjoint.force);
-                let stage = &mut into.chain.stages[k];
-                carry_state(stage, &pose.frame, &motion, &force);
-                stage.controls.fill(0.0);
-                stage.tie.fill(0.0);
-                into.slacks[k] = [Vector4::zeros(); BOUNDS];
-                motion
+            block.differentiate(self.model);
+            for (lane, k) in members[..count].iter().enumerate() {
+                self.take_element(*k, &block, lane, point, &bounds[*k], into);
             }
-        };
-        into.chain.stages[k].free = self.free(k + 1);
-        if self.is_tied(k + 1) {
-            self.linearise_tie(k, point, bounds, into);
-        }
-        *adjoint = adjoint.before(&pose.frame, &motion);
-        if !self.is_weightless() {
-            adjoint.add_load(&first, pose);
-            add_state(into, k, &first.hessian(pose));
         }
     }
 
-    /// Derivatives of one element; the motion along it.
-    fn linearise_element(
+    /// Takes the derivatives of one element over from its lane, with what its natural bend and its bounds add.
+    fn take_element(
         &self,
         k: usize,
-        element: &Element,
+        block: &Block,
+        lane: usize,
         point: &BeltPoint,
         bounds: &[f64; BOUNDS],
-        beyond: &Adjoint,
         into: &mut Linearisation,
-    ) -> Pose {
+    ) {
+        let Piece::Strip(element) = &self.pieces[k] else {
+            return;
+        };
         let fields = Self::fields_of(&point.fields, k);
-        let frame = &point.poses[k].frame;
-        let jet = element.increment_jet(&fields);
-        let force = frame.tr_mul(&beyond.force);
-        let energy = element.energy_jet(self.model, &fields);
-        let slacks: [Jet; BOUNDS] = element.slack_jets(&fields);
-        let mut controls = energy.hessian + element.increment_hessian(&jet, &force, &beyond.moment);
+        let (mut gradient, mut controls) = (block.gradient(lane), block.hessian(lane));
+        if element.curl.bend != 0.0 {
+            let across = element.across_jets(self.model, &fields);
+            let curl = element.curl_jet(self.model, &fields, &across);
+            gradient += curl.gradient;
+            controls += curl.hessian;
+        }
+        let slacks = element.slack_jets(&fields);
         if !element.strips().has_linear_bounds() {
             for (slack, multiplier) in slacks.iter().zip(bounds) {
                 controls -= *multiplier * slack.hessian;
             }
         }
-        let gradient = energy.gradient
-            + jet.position_by_fields.tr_mul(&force)
-            + jet.rotation_by_fields.tr_mul(&beyond.moment);
-        let stage = &mut into.chain.stages[k];
-        carry_state(stage, frame, &jet.value, &force);
-        carry_controls(stage, frame, &jet, &force, &beyond.moment, controls);
         into.slacks[k] = slacks.map(|slack| slack.gradient);
+        into.diagonal.controls[k] = controls;
+        block.carry(lane, &mut into.chain.stages[k]);
         for (node, rows) in [(k, 0), (k + 1, 2)] {
             let mut part = into.gradient[node].fixed_rows_mut::<2>(6);
             part += gradient.fixed_rows::<2>(rows);
         }
-        jet.value
     }
 
     /// How the slope is carried on across a joint, and what that bends of all that depends on it.
@@ -633,9 +596,9 @@ impl BeltProgram {
                 pull -= multiplier * slack[1];
             }
         }
-        let stage = &mut into.chain.stages[k];
-        stage.tie = Vector2::new(0.0, first);
-        stage.controls[(1, 1)] += second * pull;
+        into.chain.stages[k].tie = Vector2::new(0.0, first);
+        into.diagonal.controls[k] = Matrix4::zeros();
+        into.diagonal.controls[k][(1, 1)] = second * pull;
     }
 
     /// Derivatives of supports, links and loads at their nodes, second ones by their states.
@@ -648,74 +611,26 @@ impl BeltProgram {
         for (i, support) in self.supports.iter().enumerate() {
             let pose = &point.poses[support.node];
             into.constraints[i] = support.jacobian(pose);
-            into.chain.nodes[i].hessian = support.hessian(pose, &multipliers[i]);
+            into.diagonal.nodes[i].hessian = support.hessian(pose, &multipliers[i]);
         }
         for (link, rows) in self.links.iter().zip(&mut into.links) {
             *rows = link.jacobian(point);
         }
-        for NodeLoad { node, load } in &self.loads {
-            add_state(into, *node, &load.hessian(&point.poses[*node]));
+        let states = &mut into.chain.states;
+        states.clear();
+        if self.is_loaded() || !self.links.is_empty() {
+            states.resize(point.poses.len(), Matrix6::zeros());
+            let mut add = |node: usize, load: &DeadForce| {
+                states[node] += load.hessian(&point.poses[node]);
+            };
+            self.for_each_load(&mut add);
+            for (link, rows) in self.links.iter().zip(&multipliers[self.supports.len()..]) {
+                for (node, hessian) in link.nodes.iter().zip(link.hessians(point, rows)) {
+                    states[*node] += hessian;
+                }
+            }
         }
     }
-}
-
-/// Adds a second derivative by the rotation of a node to the stage that starts there.
-fn add_state(into: &mut Linearisation, node: usize, hessian: &Matrix3<f64>) {
-    let state = match into.chain.stages.get_mut(node) {
-        Some(stage) => &mut stage.state_state,
-        None => &mut into.chain.last_state,
-    };
-    let mut rotation = state.fixed_view_mut::<3, 3>(3, 3);
-    rotation += hessian;
-}
-
-/// How a motion carries the pose on, and the second derivatives of the work done at its far end by `force`, in the axes
-/// of the frame it starts from; of the stage that belongs to it always the same entries.
-fn carry_state(stage: &mut Stage, frame: &Matrix3<f64>, motion: &Pose, force: &Vector3<f64>) {
-    let p = &motion.position;
-    let carried = &mut stage.state_by_state;
-    carried.fixed_view_mut::<3, 3>(0, 0).fill_with_identity();
-    carried
-        .fixed_view_mut::<3, 3>(0, 3)
-        .copy_from(&(-frame * hat(p)));
-    carried
-        .fixed_view_mut::<3, 3>(3, 3)
-        .copy_from(&motion.frame.transpose());
-    let outer = 0.5 * (p * force.transpose() + force * p.transpose());
-    stage
-        .state_state
-        .fixed_view_mut::<3, 3>(3, 3)
-        .copy_from(&(outer - force.dot(p) * Matrix3::identity()));
-}
-
-/// How the fields of an element carry the pose on, and the second derivatives of the work done at its second node:
-/// `force` in the axes of the first node's frame, `moment` in those of the second's.
-fn carry_controls(
-    stage: &mut Stage,
-    frame: &Matrix3<f64>,
-    jet: &IncrementJet,
-    force: &Vector3<f64>,
-    moment: &Vector3<f64>,
-    controls: Matrix4<f64>,
-) {
-    let by_position = frame * jet.position_by_fields;
-    let mixed = -hat(force) * jet.position_by_fields
-        - 0.5 * jet.value.frame * hat(moment) * jet.rotation_by_fields;
-    for (columns, carried, second) in [
-        (0, &mut stage.state_by_first, &mut stage.state_first),
-        (2, &mut stage.state_by_second, &mut stage.state_second),
-    ] {
-        carried
-            .fixed_view_mut::<3, 2>(0, 0)
-            .copy_from(&by_position.fixed_columns::<2>(columns));
-        carried
-            .fixed_view_mut::<3, 2>(3, 0)
-            .copy_from(&jet.rotation_by_fields.fixed_columns::<2>(columns));
-        second
-            .fixed_view_mut::<3, 2>(3, 0)
-            .copy_from(&mixed.fixed_columns::<2>(columns));
-    }
-    stage.controls = controls;
 }
 
 #[cfg(test)]
@@ -723,6 +638,7 @@ mod tests {
     use super::*;
     use crate::energy::Curl;
     use crate::strip::Edge;
+    use nalgebra::Rotation3;
 
     fn element(length: f64, geodesic: f64) -> Piece {
         Piece::Strip(Element {
@@ -906,7 +822,7 @@ mod tests {
                     - value(&[(a.0, a.1, -h), (b.0, b.1, h)])
                     + value(&[(a.0, a.1, -h), (b.0, b.1, -h)]))
                     / (4.0 * h * h);
-                let exact = linear.chain.second_derivative(*a, *b);
+                let exact = linear.chain.second_derivative(&linear.diagonal, *a, *b);
                 assert!(
                     (second - exact).abs() < 2e-5 * exact.abs().max(10.0),
                     "{a:?} {b:?} {second} {exact}"

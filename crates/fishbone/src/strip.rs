@@ -60,7 +60,8 @@ pub struct SlopeJet {
 }
 
 impl SlopeJet {
-    fn constant(value: f64) -> Self {
+    /// A constant.
+    pub fn constant(value: f64) -> Self {
         Self {
             value,
             gradient: Vector2::zeros(),

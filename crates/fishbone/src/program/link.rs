@@ -2,9 +2,9 @@
 
 use super::BeltPoint;
 use super::support::RotationGap;
-use crate::lie::Pose;
+use crate::lie::{Pose, carried_hessian, hat};
 use crate::solver::{Rows, RowsByNode};
-use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix6, UnitQuaternion, Vector3};
 
 /// Conditions between two nodes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,10 +50,7 @@ impl NodeLink {
         rows
     }
 
-    /// Derivative of the values by both nodes' unknowns.
-    ///
-    /// The second derivatives of a frame tied to another are left out: where the tie is met they vanish in all directions
-    /// that keep it.
+    /// Derivative of the values by both nodes' unknowns, of which the first are a twist in world axes about the origin.
     pub(super) fn jacobian(&self, point: &BeltPoint) -> [RowsByNode; 2] {
         let [first, second] = self.nodes.map(|node| &point.poses[node]);
         let mut by = [RowsByNode::zeros(); 2];
@@ -65,19 +62,34 @@ impl NodeLink {
             }
             return by;
         }
-        for i in 0..3 {
-            (by[0][(i, i)], by[1][(i, i)]) = (-1.0, 1.0);
+        for (rows, pose, sign) in [(0, first, -1.0), (1, second, 1.0)] {
+            let mut moved = by[rows].fixed_view_mut::<3, 3>(0, 0);
+            moved.fill_diagonal(sign);
+            by[rows]
+                .fixed_view_mut::<3, 3>(0, 3)
+                .copy_from(&(-sign * hat(&pose.position)));
         }
         if let Tie::Pose(turn) = self.tie {
-            let jacobian = gap(first, &turn, second).jacobian();
-            // A turn of the first node is seen from the second through the frames in between.
-            let back: Matrix3<f64> = second.frame.tr_mul(&first.frame);
-            by[0]
-                .fixed_view_mut::<3, 3>(3, 3)
-                .copy_from(&(-jacobian * back));
+            let jacobian = gap(first, &turn, second).jacobian() * second.frame.transpose();
+            by[0].fixed_view_mut::<3, 3>(3, 3).copy_from(&-jacobian);
             by[1].fixed_view_mut::<3, 3>(3, 3).copy_from(&jacobian);
         }
         by
+    }
+
+    /// Second derivatives of `multipliers · values` by the twists of both nodes.
+    ///
+    /// Those of a frame tied to another are left out: where the tie is met they vanish in all directions that keep it.
+    pub(super) fn hessians(&self, point: &BeltPoint, multipliers: &Rows) -> [Matrix6<f64>; 2] {
+        let force = match self.tie {
+            Tie::Offset(_) | Tie::Pose(_) => multipliers.fixed_rows::<3>(0).into_owned(),
+            Tie::Fields(_) => Vector3::zeros(),
+        };
+        let [first, second] = self.nodes.map(|node| &point.poses[node].position);
+        [
+            carried_hessian(first, &-force),
+            carried_hessian(second, &force),
+        ]
     }
 }
 
@@ -90,8 +102,8 @@ fn gap(first: &Pose, turn: &UnitQuaternion<f64>, second: &Pose) -> RotationGap {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lie::exp;
-    use nalgebra::Vector2;
+    use crate::lie::{Twist, exp};
+    use nalgebra::{Vector2, Vector6};
 
     #[test]
     fn test_derivatives_of_ties_agree_with_finite_differences() {
@@ -118,10 +130,11 @@ mod tests {
                 for entry in 0..8 {
                     let moved = |size: f64| {
                         let mut moved = point.clone();
-                        let pose = &mut moved.poses[node];
                         match entry {
-                            0..3 => pose.position[entry] += size,
-                            3..6 => pose.frame *= exp(&(size * Vector3::ith(entry - 3, 1.0))),
+                            0..6 => {
+                                let twist = Twist::from_vector(&(size * Vector6::ith(entry, 1.0)));
+                                moved.poses[node] = Pose::exp(&twist) * moved.poses[node];
+                            }
                             _ => moved.fields[node][entry - 6] += size,
                         }
                         link.value(&moved)

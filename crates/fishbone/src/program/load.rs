@@ -1,7 +1,7 @@
 //! Dead forces: of fixed size and direction in the world, at points fixed in the body.
 
-use crate::lie::Pose;
-use nalgebra::{Matrix3, Vector3};
+use crate::lie::{Pose, carried_gradient, carried_hessian};
+use nalgebra::{Matrix6, Vector3, Vector6};
 
 /// A dead force at a node, or off it at the end of a lever fixed in the node's frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,17 +27,14 @@ impl DeadForce {
         -self.force.dot(&pose.transform(&self.lever))
     }
 
-    /// Derivative of the potential by the node's position (world axes) and rotation (body axes).
-    pub(super) fn pull(&self, pose: &Pose) -> (Vector3<f64>, Vector3<f64>) {
-        let force = pose.frame.tr_mul(&self.force);
-        (-self.force, -self.lever.cross(&force))
+    /// Derivative of the potential by a twist of the belt from the node on: the wrench about the origin, world axes.
+    pub(super) fn pull(&self, pose: &Pose) -> Vector6<f64> {
+        carried_gradient(&pose.transform(&self.lever), &-self.force)
     }
 
-    /// Second derivative of the potential by the node's rotation (body axes).
-    pub(super) fn hessian(&self, pose: &Pose) -> Matrix3<f64> {
-        let force = pose.frame.tr_mul(&self.force);
-        let outer = self.lever * force.transpose();
-        force.dot(&self.lever) * Matrix3::identity() - 0.5 * (outer + outer.transpose())
+    /// Second derivative by the twist.
+    pub(super) fn hessian(&self, pose: &Pose) -> Matrix6<f64> {
+        carried_hessian(&pose.transform(&self.lever), &-self.force)
     }
 }
 
@@ -54,7 +51,7 @@ pub(super) fn weight(per_length: &Vector3<f64>, length: f64) -> [DeadForce; 2] {
 mod tests {
     use super::*;
     use crate::element::increment;
-    use crate::lie::exp;
+    use crate::lie::{Twist, exp};
     use nalgebra::Vector4;
 
     #[test]
@@ -67,19 +64,14 @@ mod tests {
             frame: exp(&Vector3::new(0.5, 1.0, -0.7)),
             position: Vector3::new(0.1, 0.2, 0.3),
         };
-        let moved = |by: Vector3<f64>| {
-            load.potential(&Pose {
-                frame: at.frame * exp(&by),
-                ..at
-            })
-        };
+        let moved = |by: Vector6<f64>| load.potential(&(Pose::exp(&Twist::from_vector(&by)) * at));
         let h = 1e-4;
-        for i in 0..3 {
-            let e_i = h * Vector3::ith(i, 1.0);
+        for i in 0..6 {
+            let e_i = h * Vector6::ith(i, 1.0);
             let difference = (moved(e_i) - moved(-e_i)) / (2.0 * h);
-            assert!((difference - load.pull(&at).1[i]).abs() < 1e-8);
-            for j in 0..3 {
-                let e_j = h * Vector3::ith(j, 1.0);
+            assert!((difference - load.pull(&at)[i]).abs() < 1e-7);
+            for j in 0..6 {
+                let e_j = h * Vector6::ith(j, 1.0);
                 let difference = (moved(e_i + e_j) - moved(e_i - e_j) - moved(e_j - e_i)
                     + moved(-e_i - e_j))
                     / (4.0 * h * h);

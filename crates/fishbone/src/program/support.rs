@@ -1,6 +1,6 @@
 //! What holds a node: positions, frames, hinges, Eq. (35), (36).
 
-use crate::lie::{Pose, hat};
+use crate::lie::{Pose, carried_hessian, hat};
 use crate::solver::chain::NodeMatrix;
 use crate::solver::{Rows, RowsByNode};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
@@ -225,48 +225,65 @@ impl NodeSupport {
 
     pub(super) fn value(&self, pose: &Pose) -> Rows {
         let mut rows = Rows::zeros();
-        for (i, held) in self.position.iter().enumerate() {
-            rows[i] = held.map_or(0.0, |held| pose.position[i] - held);
+        for (i, held) in self.held() {
+            rows[i] = pose.position[i] - held;
         }
         rows.fixed_rows_mut::<3>(3)
             .copy_from(&self.gap(pose).value());
         rows
     }
 
+    /// Derivative of the values by the node's unknowns, of which the first are a twist in world axes about the origin.
     pub(super) fn jacobian(&self, pose: &Pose) -> RowsByNode {
         let mut rows = RowsByNode::zeros();
-        for (i, held) in self.position.iter().enumerate() {
-            rows[(i, i)] = if held.is_some() { 1.0 } else { 0.0 };
+        let by_turn = -hat(&pose.position);
+        for (i, _) in self.held() {
+            rows[(i, i)] = 1.0;
+            rows.fixed_view_mut::<1, 3>(i, 3)
+                .copy_from(&by_turn.fixed_rows::<1>(i));
         }
         rows.fixed_view_mut::<3, 3>(3, 3)
-            .copy_from(&self.gap(pose).jacobian());
+            .copy_from(&(self.gap(pose).jacobian() * pose.frame.transpose()));
         rows
     }
 
     /// Second derivative of `multipliers · value` by the node's unknowns.
     pub(super) fn hessian(&self, pose: &Pose, multipliers: &Rows) -> NodeMatrix {
+        let mut force = Vector3::zeros();
+        for (i, _) in self.held() {
+            force[i] = multipliers[i];
+        }
         let mut hessian = NodeMatrix::zeros();
-        let weights = multipliers.fixed_rows::<3>(3).into_owned();
         hessian
-            .fixed_view_mut::<3, 3>(3, 3)
-            .copy_from(&self.gap(pose).hessian(&weights));
+            .fixed_view_mut::<6, 6>(0, 0)
+            .copy_from(&carried_hessian(&pose.position, &force));
+        let weights = multipliers.fixed_rows::<3>(3).into_owned();
+        let by_turn = self.gap(pose).hessian(&weights);
+        let mut turns = hessian.fixed_view_mut::<3, 3>(3, 3);
+        turns += pose.frame * by_turn * pose.frame.transpose();
         hessian
     }
 
-    /// Force and moment of the support on the belt, world axes.
+    /// The components of the position that are prescribed.
+    fn held(&self) -> impl Iterator<Item = (usize, f64)> {
+        let components = self.position.into_iter().enumerate();
+        components.filter_map(|(i, held)| Some((i, held?)))
+    }
+
+    /// Force and moment of the support on the belt about its point, world axes.
     pub(super) fn reaction(&self, pose: &Pose, multipliers: &Rows) -> (Vector3<f64>, Vector3<f64>) {
         let pull = self.jacobian(pose).tr_mul(multipliers);
-        (
-            -pull.fixed_rows::<3>(0),
-            -(pose.frame * pull.fixed_rows::<3>(3)),
-        )
+        let force: Vector3<f64> = pull.fixed_rows::<3>(0).into_owned();
+        let moment = pull.fixed_rows::<3>(3) - pose.position.cross(&force);
+        (-force, -moment)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lie::exp;
+    use crate::lie::{Twist, exp};
+    use nalgebra::Vector6;
 
     fn frame() -> UnitQuaternion<f64> {
         UnitQuaternion::from_scaled_axis(Vector3::new(0.3, -0.4, 0.7))
@@ -297,29 +314,30 @@ mod tests {
             })
             .collect();
         holds.push(Hold::Frame(frame()));
-        let weights = Rows::new(0.0, 0.0, 0.0, 0.7, -1.3, 0.4);
+        let weights = Rows::new(1.1, 0.6, -0.8, 0.7, -1.3, 0.4);
         let h = 1e-4;
-        for support in holds.into_iter().map(support) {
-            let at = turned(Vector3::new(0.9, -1.1, 0.5));
-            let moved = |by: Vector3<f64>| {
-                let pose = Pose {
-                    frame: at.frame * exp(&by),
-                    ..at
-                };
+        for mut support in holds.into_iter().map(support) {
+            support.position = [Some(0.3), None, Some(-0.2)];
+            let at = Pose {
+                position: Vector3::new(0.5, -0.4, 0.8),
+                ..turned(Vector3::new(0.9, -1.1, 0.5))
+            };
+            let moved = |by: Vector6<f64>| {
+                let pose = Pose::exp(&Twist::from_vector(&by)) * at;
                 support.value(&pose).dot(&weights)
             };
             let exact = support.jacobian(&at).tr_mul(&weights);
             let second = support.hessian(&at, &weights);
-            for i in 0..3 {
-                let e_i = h * Vector3::ith(i, 1.0);
+            for i in 0..6 {
+                let e_i = h * Vector6::ith(i, 1.0);
                 let difference = (moved(e_i) - moved(-e_i)) / (2.0 * h);
-                assert!((difference - exact[3 + i]).abs() < 1e-7);
-                for j in 0..3 {
-                    let e_j = h * Vector3::ith(j, 1.0);
+                assert!((difference - exact[i]).abs() < 1e-7);
+                for j in 0..6 {
+                    let e_j = h * Vector6::ith(j, 1.0);
                     let difference = (moved(e_i + e_j) - moved(e_i - e_j) - moved(e_j - e_i)
                         + moved(-e_i - e_j))
                         / (4.0 * h * h);
-                    assert!((difference - second[(3 + i, 3 + j)]).abs() < 1e-6);
+                    assert!((difference - second[(i, j)]).abs() < 1e-6);
                 }
             }
         }

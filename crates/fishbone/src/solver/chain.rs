@@ -1,37 +1,33 @@
 //! Linear-quadratic programme on a chain, factorised stage by stage in time linear in its length.
 //!
-//! The chain has `N + 1` nodes joined by `N` stages. A node carries a state (6) and a control (2). The states obey
-//! `state⁺ = A state + B₀ control + B₁ control⁺`; the objective is a quadratic in every stage's
-//! `(state, control, control⁺)` plus a quadratic at any node. A control need not be free: it may be locked, or follow
-//! the one before.
+//! The chain has `N + 1` nodes joined by `N` stages. A node carries a state (6) and a control (2). The state grows by
+//! what the controls at both ends of a stage add to it, `state⁺ = state + B₀ control + B₁ control⁺`; the objective is a
+//! quadratic in every stage's controls, mixed in its `(state, control, control⁺)`, plus a quadratic at any node. A control
+//! need not be free: it may be locked, or follow the one before.
 
+use multiversion::multiversion;
 use nalgebra::{
-    Cholesky, Const, Matrix2, Matrix4, Matrix6, Matrix6x2, SMatrix, SVector, SymmetricEigen,
-    Vector2, Vector6,
+    Cholesky, Const, Matrix2, Matrix4, Matrix6, SMatrix, SVector, SymmetricEigen, Vector2,
 };
 
 /// Unknowns of a node: its state, then its control.
 pub type NodeVector = SVector<f64, 8>;
 /// A quadratic form in the unknowns of a node.
 pub type NodeMatrix = SMatrix<f64, 8, 8>;
+/// One column for either component of a control, by the unknowns of a node.
+pub type ByControl = SMatrix<f64, 8, 2>;
 
-/// One stage: how it carries the state on, and its second derivatives.
+/// One stage: what it adds to the state, and how that bends the objective.
 #[derive(Debug, Clone, Copy)]
 pub struct Stage {
-    /// A, the state's own part.
-    pub state_by_state: Matrix6<f64>,
-    /// B₀, by the control at the stage's first node.
-    pub state_by_first: Matrix6x2<f64>,
-    /// B₁, by the control at its second node.
-    pub state_by_second: Matrix6x2<f64>,
-    /// Second derivative by the state, twice.
-    pub state_state: Matrix6<f64>,
-    /// Second derivative by the state and the first control.
-    pub state_first: Matrix6x2<f64>,
-    /// Second derivative by the state and the second control.
-    pub state_second: Matrix6x2<f64>,
-    /// Second derivative by both controls, first then second.
-    pub controls: Matrix4<f64>,
+    /// B₀, growth of the state by the control at the stage's first node; its last two rows are zero.
+    pub growth_by_first: ByControl,
+    /// B₁, growth by the control at its second node; its last two rows are zero.
+    pub growth_by_second: ByControl,
+    /// Second derivative by the state and the first control; its last two rows are zero.
+    pub state_first: ByControl,
+    /// Second derivative by the state and the second control; its last two rows are zero.
+    pub state_second: ByControl,
     /// How the second control follows the first, component by component: `control⁺ = tie · control` plus a free part.
     pub tie: Vector2<f64>,
     /// Which components of the second control have a free part; without a tie either, a component is locked.
@@ -39,19 +35,27 @@ pub struct Stage {
 }
 
 impl Stage {
-    /// A stage that carries nothing on and costs nothing.
+    /// A stage that adds nothing and costs nothing.
     pub fn zero() -> Self {
         Self {
-            state_by_state: Matrix6::zeros(),
-            state_by_first: Matrix6x2::zeros(),
-            state_by_second: Matrix6x2::zeros(),
-            state_state: Matrix6::zeros(),
-            state_first: Matrix6x2::zeros(),
-            state_second: Matrix6x2::zeros(),
-            controls: Matrix4::zeros(),
+            growth_by_first: ByControl::zeros(),
+            growth_by_second: ByControl::zeros(),
+            state_first: ByControl::zeros(),
+            state_second: ByControl::zeros(),
             tie: Vector2::zeros(),
             free: [true; 2],
         }
+    }
+
+    /// The state that the stage carries a node's unknowns and the next control to, with that control.
+    fn carry(&self, node: &NodeVector, second: &Vector2<f64>) -> NodeVector {
+        let mut next = *node;
+        for j in 0..2 {
+            add_scaled(&mut next, node[6 + j], &self.growth_by_first, j);
+            add_scaled(&mut next, second[j], &self.growth_by_second, j);
+        }
+        (next[6], next[7]) = (second[0], second[1]);
+        next
     }
 }
 
@@ -64,25 +68,32 @@ pub struct NodeTerm {
     pub hessian: NodeMatrix,
 }
 
-/// The second-order part of the programme.
+/// What of the second-order part does not change with the barrier.
 #[derive(Debug, Clone)]
 pub struct Chain {
     /// The stages in order.
     pub stages: Vec<Stage>,
-    /// Terms at single nodes, by rising node.
-    pub nodes: Vec<NodeTerm>,
-    /// Second derivative by the state of the last node, from which no stage starts.
-    pub last_state: Matrix6<f64>,
+    /// Second derivative by the state of every node; empty where there is none.
+    pub states: Vec<Matrix6<f64>>,
     /// Which components of the first control are free.
     pub first_free: [bool; 2],
 }
 
-/// What the elimination of one stage's second control leaves behind.
+/// The rest of it.
+#[derive(Debug, Clone)]
+pub struct Diagonal {
+    /// Second derivative by both controls of every stage, first then second.
+    pub controls: Vec<Matrix4<f64>>,
+    /// Terms at single nodes, by rising node.
+    pub nodes: Vec<NodeTerm>,
+}
+
+/// What the elimination of one stage's second control leaves behind: it is −`gain`ᵀ times the node's unknowns, less
+/// `inverse` times what pulls at it.
 #[derive(Debug, Clone, Copy)]
 struct Elimination {
     inverse: Matrix2<f64>,
-    by_state: Matrix6x2<f64>,
-    by_first: Matrix2<f64>,
+    gain: ByControl,
 }
 
 /// The factorised second derivative by the first node's unknowns.
@@ -106,8 +117,7 @@ impl Factor {
     pub fn new(stages: usize) -> Self {
         let nothing = Elimination {
             inverse: Matrix2::zeros(),
-            by_state: Matrix6x2::zeros(),
-            by_first: Matrix2::zeros(),
+            gain: ByControl::zeros(),
         };
         Self {
             eliminations: vec![nothing; stages],
@@ -154,41 +164,6 @@ impl First {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TooConcave;
 
-/// Least remaining cost as a function of a node's unknowns.
-#[derive(Clone, Copy)]
-struct CostToGo {
-    state: Matrix6<f64>,
-    mixed: Matrix6x2<f64>,
-    control: Matrix2<f64>,
-}
-
-impl CostToGo {
-    fn zero() -> Self {
-        Self {
-            state: Matrix6::zeros(),
-            mixed: Matrix6x2::zeros(),
-            control: Matrix2::zeros(),
-        }
-    }
-
-    fn add(&mut self, term: &NodeMatrix) {
-        self.state += term.fixed_view::<6, 6>(0, 0);
-        self.mixed += term.fixed_view::<6, 2>(0, 6);
-        self.control += term.fixed_view::<2, 2>(6, 6);
-    }
-
-    fn matrix(&self) -> NodeMatrix {
-        let mut whole = NodeMatrix::zeros();
-        whole.fixed_view_mut::<6, 6>(0, 0).copy_from(&self.state);
-        whole.fixed_view_mut::<6, 2>(0, 6).copy_from(&self.mixed);
-        whole
-            .fixed_view_mut::<2, 6>(6, 0)
-            .copy_from(&self.mixed.transpose());
-        whole.fixed_view_mut::<2, 2>(6, 6).copy_from(&self.control);
-        whole
-    }
-}
-
 impl Chain {
     /// Factorises the chain with `damping` added to the second derivative by the unknowns: the first state, and every
     /// control times the node's weight. Says in how many directions, of `most` that are allowed, it is concave.
@@ -196,29 +171,16 @@ impl Chain {
     /// Errors: [`TooConcave`] where there are more, or a direction of no curvature.
     pub fn factorise(
         &self,
+        diagonal: &Diagonal,
         damping: f64,
         weights: &[f64],
         most: usize,
         into: &mut Factor,
     ) -> Result<usize, TooConcave> {
-        let mut terms = self.nodes.iter().rev().peekable();
-        let mut cost = CostToGo::zero();
-        cost.state = self.last_state;
-        let mut concave = 0;
-        for k in (0..weights.len()).rev() {
-            cost.control += Matrix2::identity() * (damping * weights[k]);
-            while let Some(term) = terms.next_if(|term| term.node == k) {
-                cost.add(&term.hessian);
-            }
-            if k > 0 {
-                let negative;
-                (into.eliminations[k - 1], cost, negative) =
-                    eliminate(&self.stages[k - 1], &cost, most - concave)?;
-                concave += negative;
-            }
+        let (mut first, concave) = eliminate_all(self, diagonal, damping, weights, most, into)?;
+        for i in 0..6 {
+            first[(i, i)] += damping;
         }
-        cost.state += Matrix6::identity() * damping;
-        let mut first = cost.matrix();
         for (i, free) in self.first_free.iter().enumerate() {
             if !free {
                 lock(&mut first, 6 + i);
@@ -252,116 +214,222 @@ impl Chain {
     ///
     /// Shapes: `gradient` and `step` have one entry a node.
     pub fn solve(&self, factor: &mut Factor, gradient: &[NodeVector], step: &mut [NodeVector]) {
-        let mut cost = self.gather(factor, gradient);
+        let mut cost = gather(self, factor, gradient);
         for (i, free) in self.first_free.iter().enumerate() {
             if !free {
                 cost[6 + i] = 0.0;
             }
         }
         step[0] = -factor.first.solve(&cost);
-        for (k, stage) in self.stages.iter().enumerate() {
-            let e = &factor.eliminations[k];
-            let state = step[k].fixed_rows::<6>(0);
-            let first = step[k].fixed_rows::<2>(6);
-            let second = stage.tie.component_mul(&first)
-                - factor.pulls[k]
-                - e.inverse * (e.by_state.tr_mul(&state) + e.by_first.tr_mul(&first));
-            let next = stage.state_by_state * state
-                + stage.state_by_first * first
-                + stage.state_by_second * second;
-            step[k + 1].fixed_rows_mut::<6>(0).copy_from(&next);
-            step[k + 1].fixed_rows_mut::<2>(6).copy_from(&second);
-        }
-    }
-
-    /// Gradient of the cost-to-go by the first node's unknowns; leaves every stage's pull behind.
-    fn gather(&self, factor: &mut Factor, gradient: &[NodeVector]) -> NodeVector {
-        let mut cost = gradient[self.stages.len()];
-        for (k, stage) in self.stages.iter().enumerate().rev() {
-            let e = &factor.eliminations[k];
-            let state: Vector6<f64> = cost.fixed_rows::<6>(0).into_owned();
-            let second = stage.state_by_second.tr_mul(&state) + cost.fixed_rows::<2>(6);
-            let pull = e.inverse * stage.unlocked(&second);
-            cost = gradient[k];
-            let mut by_state = cost.fixed_rows_mut::<6>(0);
-            by_state += stage.state_by_state.tr_mul(&state) - e.by_state * pull;
-            let mut by_first = cost.fixed_rows_mut::<2>(6);
-            by_first += stage.state_by_first.tr_mul(&state) + stage.tie.component_mul(&second)
-                - e.by_first * pull;
-            factor.pulls[k] = pull;
-        }
-        cost
+        spread(self, factor, step);
     }
 }
 
-impl Stage {
-    /// The components of a vector in which the second control is free.
-    fn unlocked(&self, vector: &Vector2<f64>) -> Vector2<f64> {
-        Vector2::from_fn(|i, _| if self.free[i] { vector[i] } else { 0.0 })
+/// Eliminates the second control of every stage, from the last to the first; the cost as a function of the first node's
+/// unknowns, and in how many directions it was concave.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
+fn eliminate_all(
+    chain: &Chain,
+    diagonal: &Diagonal,
+    damping: f64,
+    weights: &[f64],
+    most: usize,
+    into: &mut Factor,
+) -> Result<(NodeMatrix, usize), TooConcave> {
+    let mut terms = diagonal.nodes.iter().rev().peekable();
+    let mut cost = NodeMatrix::zeros();
+    let mut concave = 0;
+    for k in (0..weights.len()).rev() {
+        for i in 6..8 {
+            cost[(i, i)] += damping * weights[k];
+        }
+        if let Some(state) = chain.states.get(k) {
+            let mut own = cost.fixed_view_mut::<6, 6>(0, 0);
+            own += state;
+        }
+        while let Some(term) = terms.next_if(|term| term.node == k) {
+            cost += term.hessian;
+        }
+        if k > 0 {
+            let (stage, controls) = (&chain.stages[k - 1], &diagonal.controls[k - 1]);
+            concave += eliminate(
+                stage,
+                controls,
+                most - concave,
+                &mut cost,
+                &mut into.eliminations[k - 1],
+            )?;
+        }
     }
+    Ok((cost, concave))
+}
+
+/// Eliminates the free part of a stage's second control from the cost beyond it, which becomes that before it; says in how
+/// many directions it was concave.
+#[inline(always)]
+fn eliminate(
+    stage: &Stage,
+    controls: &Matrix4<f64>,
+    most: usize,
+    cost: &mut NodeMatrix,
+    into: &mut Elimination,
+) -> Result<usize, TooConcave> {
+    // The cost's derivative by the unknowns beyond, as the second control or the first moves these.
+    let mut by_second = cost.fixed_columns::<2>(6).into_owned();
+    let mut by_first = ByControl::zeros();
+    for j in 0..2 {
+        for i in 0..6 {
+            for row in 0..8 {
+                by_second[(row, j)] += stage.growth_by_second[(i, j)] * cost[(row, i)];
+                by_first[(row, j)] += stage.growth_by_first[(i, j)] * cost[(row, i)];
+            }
+        }
+    }
+    let mut pivot = Matrix2::zeros();
+    let mut toward = by_second + stage.state_second;
+    for i in 0..2 {
+        for j in 0..2 {
+            pivot[(i, j)] = controls[(2 + i, 2 + j)]
+                + by_second[(6 + i, j)]
+                + dot(&stage.growth_by_second, i, &by_second, j);
+            toward[(6 + i, j)] =
+                controls[(i, 2 + j)] + dot(&stage.growth_by_first, i, &by_second, j);
+            by_first[(6 + i, j)] = controls[(i, j)] + dot(&stage.growth_by_first, i, &by_first, j);
+        }
+    }
+    by_first += stage.state_first;
+    if stage.tie != Vector2::zeros() {
+        follow(stage, &mut pivot, &mut toward, &mut by_first);
+    }
+    for j in 0..2 {
+        for row in 0..8 {
+            cost[(row, 6 + j)] = by_first[(row, j)];
+        }
+        for row in 0..6 {
+            cost[(6 + j, row)] = by_first[(row, j)];
+        }
+    }
+    for (i, free) in stage.free.iter().enumerate() {
+        if !free {
+            lock(&mut pivot, i);
+            toward.column_mut(i).fill(0.0);
+        }
+    }
+    let (inverse, concave) = invert(&pivot, most)?;
+    let mut gain = ByControl::zeros();
+    for j in 0..2 {
+        for row in 0..8 {
+            gain[(row, j)] =
+                toward[(row, 0)] * inverse[(0, j)] + toward[(row, 1)] * inverse[(1, j)];
+        }
+    }
+    for column in 0..8 {
+        for row in 0..8 {
+            cost[(row, column)] -=
+                gain[(row, 0)] * toward[(column, 0)] + gain[(row, 1)] * toward[(column, 1)];
+        }
+    }
+    *into = Elimination { inverse, gain };
+    Ok(concave)
+}
+
+/// Lets what the second control costs be borne by the first, which it follows.
+#[inline(always)]
+fn follow(
+    stage: &Stage,
+    pivot: &mut Matrix2<f64>,
+    toward: &mut ByControl,
+    by_first: &mut ByControl,
+) {
+    let tie = Matrix2::from_diagonal(&stage.tie);
+    let through = *toward * tie;
+    *by_first += through;
+    let mut own = by_first.fixed_rows_mut::<2>(6);
+    own += through.fixed_rows::<2>(6).transpose() + tie * *pivot * tie;
+    let mut own = toward.fixed_rows_mut::<2>(6);
+    own += tie * *pivot;
+}
+
+/// Gradient of the cost-to-go by the first node's unknowns; leaves every stage's pull behind.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
+fn gather(chain: &Chain, factor: &mut Factor, gradient: &[NodeVector]) -> NodeVector {
+    let mut cost = gradient[chain.stages.len()];
+    let stages = chain
+        .stages
+        .iter()
+        .zip(&factor.eliminations)
+        .zip(&mut factor.pulls);
+    for (((stage, e), pull), own) in stages.zip(gradient).rev() {
+        let mut before = *own;
+        let mut second = [0.0; 2];
+        for j in 0..2 {
+            let by_first = dot(&stage.growth_by_first, j, &cost, 0);
+            let by_second = cost[6 + j] + dot(&stage.growth_by_second, j, &cost, 0);
+            before[6 + j] += by_first + stage.tie[j] * by_second;
+            second[j] = if stage.free[j] { by_second } else { 0.0 };
+        }
+        for row in 0..6 {
+            before[row] += cost[row];
+        }
+        for j in 0..2 {
+            add_scaled(&mut before, -second[j], &e.gain, j);
+        }
+        *pull = e.inverse * Vector2::from(second);
+        cost = before;
+    }
+    cost
+}
+
+/// Carries a step on from the first node along the chain, every control as it was eliminated.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
+fn spread(chain: &Chain, factor: &Factor, step: &mut [NodeVector]) {
+    let mut node = step[0];
+    let stages = chain
+        .stages
+        .iter()
+        .zip(&factor.eliminations)
+        .zip(&factor.pulls);
+    for (((stage, e), pull), next) in stages.zip(&mut step[1..]) {
+        let second = [0, 1].map(|j| {
+            let own =
+                dot(&e.gain, j, &node, 0) + e.gain[(6, j)] * node[6] + e.gain[(7, j)] * node[7];
+            stage.tie[j] * node[6 + j] - pull[j] - own
+        });
+        node = stage.carry(&node, &Vector2::from(second));
+        *next = node;
+    }
+}
+
+/// Adds a multiple of a column.
+#[inline(always)]
+fn add_scaled(into: &mut NodeVector, by: f64, matrix: &ByControl, column: usize) {
+    for row in 0..8 {
+        into[row] += by * matrix[(row, column)];
+    }
+}
+
+/// Scalar product of the states in two columns.
+#[inline(always)]
+fn dot<const A: usize, const B: usize>(
+    a: &SMatrix<f64, 8, A>,
+    i: usize,
+    b: &SMatrix<f64, 8, B>,
+    j: usize,
+) -> f64 {
+    let product = |row: usize| a[(row, i)] * b[(row, j)];
+    (product(0) + product(1)) + (product(2) + product(3)) + (product(4) + product(5))
 }
 
 /// Makes an entry of the unknowns its own, unit, equation.
+#[inline(always)]
 fn lock<const N: usize>(matrix: &mut SMatrix<f64, N, N>, entry: usize) {
     matrix.row_mut(entry).fill(0.0);
     matrix.column_mut(entry).fill(0.0);
     matrix[(entry, entry)] = 1.0;
 }
 
-/// Eliminates the free part of a stage's second control from the cost beyond it; says in how many directions that was
-/// concave.
-fn eliminate(
-    stage: &Stage,
-    beyond: &CostToGo,
-    most: usize,
-) -> Result<(Elimination, CostToGo, usize), TooConcave> {
-    let cost_by_state = beyond.state * stage.state_by_state;
-    let cost_by_first = beyond.state * stage.state_by_first;
-    let cost_by_second = beyond.state * stage.state_by_second;
-    let toward_second = cost_by_second + beyond.mixed;
-    let cross = stage.state_by_second.tr_mul(&beyond.mixed);
-    let mut pivot = beyond.control
-        + stage.controls.fixed_view::<2, 2>(2, 2)
-        + stage.state_by_second.tr_mul(&cost_by_second)
-        + cross
-        + cross.transpose();
-    let mut by_state = stage.state_second + stage.state_by_state.tr_mul(&toward_second);
-    let mut by_first =
-        stage.controls.fixed_view::<2, 2>(0, 2) + stage.state_by_first.tr_mul(&toward_second);
-    let mut before = CostToGo {
-        state: stage.state_state + stage.state_by_state.tr_mul(&cost_by_state),
-        mixed: stage.state_first + stage.state_by_state.tr_mul(&cost_by_first),
-        control: stage.controls.fixed_view::<2, 2>(0, 0)
-            + stage.state_by_first.tr_mul(&cost_by_first),
-    };
-    if stage.tie != Vector2::zeros() {
-        let tie = Matrix2::from_diagonal(&stage.tie);
-        let through = by_first * tie;
-        before.mixed += by_state * tie;
-        before.control += through + through.transpose() + tie * pivot * tie;
-        by_first += tie * pivot;
-    }
-    for (i, free) in stage.free.iter().enumerate() {
-        if !free {
-            lock(&mut pivot, i);
-            by_state.column_mut(i).fill(0.0);
-            by_first.column_mut(i).fill(0.0);
-        }
-    }
-    let (inverse, concave) = invert(&pivot, most)?;
-    let gain_state = by_state * inverse;
-    before.state -= gain_state * by_state.transpose();
-    before.mixed -= gain_state * by_first.transpose();
-    before.control -= by_first * inverse * by_first.transpose();
-    let elimination = Elimination {
-        inverse,
-        by_state,
-        by_first,
-    };
-    Ok((elimination, before, concave))
-}
-
 /// Inverse of a symmetric 2×2 matrix with at most so many negative eigenvalues, and their number.
+#[inline(always)]
 fn invert(m: &Matrix2<f64>, most: usize) -> Result<(Matrix2<f64>, usize), TooConcave> {
     let (a, b, d) = (m[(0, 0)], 0.5 * (m[(0, 1)] + m[(1, 0)]), m[(1, 1)]);
     let determinant = a * d - b * b;
@@ -385,58 +453,56 @@ fn invert(m: &Matrix2<f64>, most: usize) -> Result<(Matrix2<f64>, usize), TooCon
 impl Chain {
     /// Second derivative of the objective by two unknowns, each a node and its entry, with the states carried along:
     /// what the factorisation must agree with.
-    pub(crate) fn second_derivative(&self, a: (usize, usize), b: (usize, usize)) -> f64 {
+    pub(crate) fn second_derivative(
+        &self,
+        diagonal: &Diagonal,
+        a: (usize, usize),
+        b: (usize, usize),
+    ) -> f64 {
         let unit = |(node, entry): (usize, usize)| {
             let mut step = vec![NodeVector::zeros(); self.stages.len() + 1];
             step[node][entry] = 1.0;
             self.carry(&mut step);
             step
         };
-        self.bilinear(&unit(a), &unit(b))
+        self.bilinear(diagonal, &unit(a), &unit(b))
     }
 
     /// Carries the states of a step along the chain from its first state and its controls.
     pub(crate) fn carry(&self, step: &mut [NodeVector]) {
         for (k, stage) in self.stages.iter().enumerate() {
-            for i in 0..2 {
+            let second = Vector2::from_fn(|i, _| {
                 let free = if stage.free[i] {
                     step[k + 1][6 + i]
                 } else {
                     0.0
                 };
-                step[k + 1][6 + i] = stage.tie[i] * step[k][6 + i] + free;
-            }
-            let next = stage.state_by_state * step[k].fixed_rows::<6>(0)
-                + stage.state_by_first * step[k].fixed_rows::<2>(6)
-                + stage.state_by_second * step[k + 1].fixed_rows::<2>(6);
-            step[k + 1].fixed_rows_mut::<6>(0).copy_from(&next);
+                stage.tie[i] * step[k][6 + i] + free
+            });
+            step[k + 1] = stage.carry(&step[k], &second);
         }
     }
 
-    fn bilinear(&self, x: &[NodeVector], y: &[NodeVector]) -> f64 {
+    fn bilinear(&self, diagonal: &Diagonal, x: &[NodeVector], y: &[NodeVector]) -> f64 {
         let controls = |v: &[NodeVector], k: usize| {
             nalgebra::Vector4::new(v[k][6], v[k][7], v[k + 1][6], v[k + 1][7])
         };
         let stages = self.stages.iter().enumerate().map(|(k, stage)| {
             let mixed = |s: &NodeVector, c: &nalgebra::Vector4<f64>| {
-                let state = s.fixed_rows::<6>(0);
-                state.dot(&(stage.state_first * c.fixed_rows::<2>(0)))
-                    + state.dot(&(stage.state_second * c.fixed_rows::<2>(2)))
+                s.dot(&(stage.state_first * c.fixed_rows::<2>(0)))
+                    + s.dot(&(stage.state_second * c.fixed_rows::<2>(2)))
             };
             let (cx, cy) = (controls(x, k), controls(y, k));
-            x[k].fixed_rows::<6>(0)
-                .dot(&(stage.state_state * y[k].fixed_rows::<6>(0)))
-                + cx.dot(&(stage.controls * cy))
-                + mixed(&x[k], &cy)
-                + mixed(&y[k], &cx)
+            cx.dot(&(diagonal.controls[k] * cy)) + mixed(&x[k], &cy) + mixed(&y[k], &cx)
         });
-        let nodes = self
+        let nodes = diagonal
             .nodes
             .iter()
             .map(|term| x[term.node].dot(&(term.hessian * y[term.node])));
-        let last = self.stages.len();
-        let state = |v: &[NodeVector]| v[last].fixed_rows::<6>(0).into_owned();
-        stages.sum::<f64>() + nodes.sum::<f64>() + state(x).dot(&(self.last_state * state(y)))
+        let state = |v: &[NodeVector], k: usize| v[k].fixed_rows::<6>(0).into_owned();
+        let states = self.states.iter().enumerate();
+        let states = states.map(|(k, own)| state(x, k).dot(&(own * state(y, k))));
+        stages.sum::<f64>() + nodes.sum::<f64>() + states.sum::<f64>()
     }
 }
 
@@ -459,20 +525,21 @@ mod tests {
         root * root.transpose() + SMatrix::identity() * 0.1
     }
 
-    /// A chain with positive stages, from random numbers.
-    fn chain(numbers: &mut impl Iterator<Item = f64>) -> Chain {
-        let stage = |numbers: &mut _| {
-            let whole = positive::<10>(numbers);
-            Stage {
-                state_by_state: matrix(numbers),
-                state_by_first: matrix(numbers),
-                state_by_second: matrix(numbers),
-                state_state: whole.fixed_view::<6, 6>(0, 0).into_owned(),
-                state_first: whole.fixed_view::<6, 2>(0, 6).into_owned(),
-                state_second: whole.fixed_view::<6, 2>(0, 8).into_owned(),
-                controls: whole.fixed_view::<4, 4>(6, 6).into_owned(),
-                ..Stage::zero()
-            }
+    fn column(numbers: &mut impl Iterator<Item = f64>) -> ByControl {
+        let mut column = matrix::<8, 2>(numbers);
+        column.fixed_rows_mut::<2>(6).fill(0.0);
+        column
+    }
+
+    /// A chain from random numbers, positive if the states are stiff enough.
+    fn chain(numbers: &mut impl Iterator<Item = f64>) -> (Chain, Diagonal) {
+        const STIFF: f64 = 4.0;
+        let stage = |numbers: &mut _| Stage {
+            growth_by_first: column(numbers),
+            growth_by_second: column(numbers),
+            state_first: column(numbers),
+            state_second: column(numbers),
+            ..Stage::zero()
         };
         let term = |node, numbers: &mut _| NodeTerm {
             node,
@@ -482,12 +549,18 @@ mod tests {
         // Stage 1 is a joint: its second control is half tied, half free.
         (stages[1].tie, stages[1].free) = (Vector2::new(0.0, 0.7), [true, false]);
         stages[3].free = [false, true];
-        Chain {
+        let stiff = |numbers: &mut _| positive::<6>(numbers) + Matrix6::identity() * STIFF;
+        let chain = Chain {
             stages,
-            nodes: vec![term(0, numbers), term(3, numbers), term(STAGES, numbers)],
-            last_state: positive(numbers),
+            states: (0..=STAGES).map(|_| stiff(numbers)).collect(),
             first_free: [true, false],
-        }
+        };
+        let controls = |_| positive::<4>(numbers) + Matrix4::identity() * STIFF;
+        let diagonal = Diagonal {
+            controls: (0..STAGES).map(controls).collect(),
+            nodes: vec![term(0, numbers), term(3, numbers), term(STAGES, numbers)],
+        };
+        (chain, diagonal)
     }
 
     fn unknowns() -> Vec<(usize, usize)> {
@@ -499,10 +572,10 @@ mod tests {
             .collect()
     }
 
-    fn dense(chain: &Chain) -> DMatrix<f64> {
+    fn dense((chain, diagonal): &(Chain, Diagonal)) -> DMatrix<f64> {
         let unknowns = unknowns();
         DMatrix::from_fn(unknowns.len(), unknowns.len(), |i, j| {
-            chain.second_derivative(unknowns[i], unknowns[j])
+            chain.second_derivative(diagonal, unknowns[i], unknowns[j])
         })
     }
 
@@ -524,11 +597,12 @@ mod tests {
         #[test]
         fn test_step_is_that_of_dense_elimination(numbers in prop::collection::vec(-1.0..1.0f64, 2000)) {
             let mut numbers = numbers.into_iter().cycle();
-            let chain = chain(&mut numbers);
+            let both = chain(&mut numbers);
+            let (chain, diagonal) = &both;
             let gradient: Vec<NodeVector> = (0..=STAGES).map(|_| matrix(&mut numbers)).collect();
-            let expected = -dense(&chain).cholesky().unwrap().solve(&condensed(&chain, &gradient));
+            let expected = -dense(&both).cholesky().unwrap().solve(&condensed(chain, &gradient));
             let mut factor = Factor::new(STAGES);
-            prop_assert_eq!(chain.factorise(0.0, &[1.0; STAGES + 1], 0, &mut factor), Ok(0));
+            prop_assert_eq!(chain.factorise(diagonal, 0.0, &[1.0; STAGES + 1], 0, &mut factor), Ok(0));
             let mut step = vec![NodeVector::zeros(); STAGES + 1];
             chain.solve(&mut factor, &gradient, &mut step);
             for (unknown, value) in unknowns().into_iter().zip(expected.iter()) {
@@ -546,12 +620,14 @@ mod tests {
             numbers in prop::collection::vec(-1.0..1.0f64, 2000),
             shift in -3.0..3.0f64,
         ) {
-            let mut chain = chain(&mut numbers.into_iter().cycle());
-            chain.stages[2].controls[(1, 1)] += shift;
-            let eigenvalues = dense(&chain).symmetric_eigenvalues();
+            let mut both = chain(&mut numbers.into_iter().cycle());
+            both.1.controls[2][(1, 1)] += shift;
+            let eigenvalues = dense(&both).symmetric_eigenvalues();
             prop_assume!(eigenvalues.iter().all(|value| value.abs() > 1e-6));
             let negative = eigenvalues.iter().filter(|value| **value < 0.0).count();
-            let factorise = |most| chain.factorise(0.0, &[1.0; STAGES + 1], most, &mut Factor::new(STAGES));
+            let (chain, diagonal) = &both;
+            let factorise =
+                |most| chain.factorise(diagonal, 0.0, &[1.0; STAGES + 1], most, &mut Factor::new(STAGES));
             prop_assert_eq!(factorise(0).is_ok(), negative == 0);
             prop_assert_eq!(factorise(9), Ok(negative));
         }
@@ -559,25 +635,26 @@ mod tests {
         #[test]
         fn test_step_of_a_concave_chain_is_stationary(numbers in prop::collection::vec(-1.0..1.0f64, 2000)) {
             let mut numbers = numbers.into_iter().cycle();
-            let mut chain = chain(&mut numbers);
-            chain.nodes[0].hessian[(2, 2)] -= 1e3;
-            chain.stages[3].controls[(1, 1)] -= 30.0;
+            let mut both = chain(&mut numbers);
+            both.1.nodes[0].hessian[(2, 2)] -= 1e3;
+            both.1.controls[3][(1, 1)] -= 30.0;
+            let (chain, diagonal) = &both;
             let gradient: Vec<NodeVector> = (0..=STAGES).map(|_| matrix(&mut numbers)).collect();
             let mut factor = Factor::new(STAGES);
-            let concave = chain.factorise(0.0, &[1.0; STAGES + 1], 9, &mut factor);
+            let concave = chain.factorise(diagonal, 0.0, &[1.0; STAGES + 1], 9, &mut factor);
             prop_assume!(concave.is_ok_and(|count| count > 0));
             let mut step = vec![NodeVector::zeros(); STAGES + 1];
             chain.solve(&mut factor, &gradient, &mut step);
-            let by_unknowns = dense(&chain)
+            let by_unknowns = dense(&both)
                 * DVector::from_iterator(unknowns().len(), unknowns().into_iter().map(|(k, i)| step[k][i]));
-            let expected = -condensed(&chain, &gradient);
+            let expected = -condensed(chain, &gradient);
             prop_assert!((by_unknowns - &expected).amax() < 1e-5 * expected.amax().max(1.0));
         }
 
         #[test]
         fn test_folded_gradient_is_that_by_the_unknowns(numbers in prop::collection::vec(-1.0..1.0f64, 2000)) {
             let mut numbers = numbers.into_iter().cycle();
-            let chain = chain(&mut numbers);
+            let (chain, _) = chain(&mut numbers);
             let controls = |_| { let mut g: NodeVector = matrix(&mut numbers); g.fixed_rows_mut::<6>(0).fill(0.0); g };
             let gradient: Vec<NodeVector> = (0..=STAGES).map(controls).collect();
             let expected = condensed(&chain, &gradient);
@@ -593,14 +670,17 @@ mod tests {
     #[test]
     fn test_damping_makes_a_concave_chain_convex() {
         let mut numbers = (1..).map(|i| f64::from(i).sin());
-        let mut chain = chain(&mut numbers);
-        chain.stages[2].controls -= Matrix4::identity() * 50.0;
+        let (chain, mut diagonal) = chain(&mut numbers);
+        diagonal.controls[2] -= Matrix4::identity() * 50.0;
         let mut factor = Factor::new(STAGES);
         let weights = [1.0; STAGES + 1];
         assert_eq!(
-            chain.factorise(0.0, &weights, 0, &mut factor),
+            chain.factorise(&diagonal, 0.0, &weights, 0, &mut factor),
             Err(TooConcave)
         );
-        assert_eq!(chain.factorise(100.0, &weights, 0, &mut factor), Ok(0));
+        assert_eq!(
+            chain.factorise(&diagonal, 100.0, &weights, 0, &mut factor),
+            Ok(0)
+        );
     }
 }

@@ -118,7 +118,7 @@ impl<'a, P: Program> State<'a, P> {
             self.lower_barrier();
             self.newton
                 .assemble(&self.linear, &self.values, &self.bound_multipliers);
-            if self.newton.factorise().is_err() {
+            if self.newton.factorise(&self.linear).is_err() {
                 return Outcome::Unbounded;
             }
             self.find_step();
@@ -427,7 +427,8 @@ impl<'a, P: Program> State<'a, P> {
         self.linear.gradient.fill(NodeVector::zeros());
         self.newton
             .assemble(&self.linear, &self.values, &self.bound_multipliers);
-        if self.newton.factorise_damped(self.barrier.sqrt()).is_err() {
+        let damping = self.barrier.sqrt();
+        if self.newton.factorise_damped(&self.linear, damping).is_err() {
             return false;
         }
         self.find_step();
@@ -572,12 +573,12 @@ mod tests {
                 beyond += pulls(k + 1);
                 let mean = 0.5 * (ride.push[k][0] + ride.push[k + 1][0]);
                 let stage = &mut into.chain.stages[k];
-                stage.state_by_state.fill_with_identity();
-                stage.state_by_first[(0, 0)] = 0.5 * SHARE;
-                stage.state_by_second[(0, 0)] = 0.5 * SHARE;
+                stage.growth_by_first[(0, 0)] = 0.5 * SHARE;
+                stage.growth_by_second[(0, 0)] = 0.5 * SHARE;
                 let by_mean = Vector4::new(0.5, 0.0, 0.5, 0.0);
-                stage.controls = SHARE * by_mean * by_mean.transpose();
-                stage.controls[(1, 1)] += SHARE;
+                let controls = &mut into.diagonal.controls[k];
+                *controls = SHARE * by_mean * by_mean.transpose();
+                controls[(1, 1)] += SHARE;
                 let pull = SHARE * (mean + beyond) * by_mean;
                 add_controls(&mut into.gradient, k, &pull);
                 into.gradient[k][7] += SHARE * ride.push[k][1];

@@ -15,8 +15,8 @@ mod rank;
 pub use interior_point::minimise;
 pub use rank::dependent_constraints;
 
-use chain::{Chain, NodeMatrix, NodeTerm, NodeVector, Stage};
-use nalgebra::{Matrix6, SMatrix, SVector, Vector4};
+use chain::{Chain, Diagonal, NodeMatrix, NodeTerm, NodeVector, Stage};
+use nalgebra::{Matrix4, SMatrix, SVector, Vector4};
 
 /// Most equality constraints at one node, or between one pair of nodes.
 pub const ROWS: usize = 6;
@@ -46,11 +46,13 @@ pub struct Values {
 pub struct Linearisation {
     /// Second derivatives of the Lagrangian of equalities and inequalities.
     pub chain: Chain,
+    /// Those by controls, and at constrained nodes.
+    pub diagonal: Diagonal,
     /// Gradient of the Lagrangian of the equalities, by the unknowns of every node.
     pub gradient: Vec<NodeVector>,
     /// Derivatives of the constraints at nodes, one entry a constrained node.
     pub constraints: Vec<RowsByNode>,
-    /// Derivatives of the constraints between pairs, by either node; they are linear.
+    /// Derivatives of the constraints between pairs, by either node.
     pub links: Vec<[RowsByNode; 2]>,
     /// Derivatives of the inequalities by both controls of their stage.
     pub slacks: Vec<[Vector4<f64>; BOUNDS]>,
@@ -211,9 +213,12 @@ impl Linearisation {
             links: vec![[RowsByNode::zeros(); 2]; program.linked_nodes().len()],
             chain: Chain {
                 stages: vec![Stage::zero(); stages],
-                nodes,
-                last_state: Matrix6::zeros(),
+                states: Vec::new(),
                 first_free: [true; 2],
+            },
+            diagonal: Diagonal {
+                controls: vec![Matrix4::zeros(); stages],
+                nodes,
             },
             gradient: vec![NodeVector::zeros(); stages + 1],
             slacks: vec![[Vector4::zeros(); BOUNDS]; stages],

@@ -1,7 +1,7 @@
 //! The Newton system of a barrier problem: bounds eliminated, inertia controlled, constraints met exactly.
 
 use super::border::Border;
-use super::chain::{Chain, Factor, NodeVector, TooConcave};
+use super::chain::{Diagonal, Factor, NodeVector, TooConcave};
 use super::{Bounds, Curvature, Linearisation, Rows, RowsByNode, Values};
 
 /// Compliance lent to the constraints so that the chain can be factorised without them; refinement takes it back.
@@ -11,9 +11,8 @@ const REFINEMENTS: usize = 2;
 /// The factorised Newton system and its solution, with the room it needs.
 #[derive(Debug, Clone)]
 pub(super) struct Newton {
-    chain: Chain,
+    diagonal: Diagonal,
     factor: Factor,
-    links: Vec<[RowsByNode; 2]>,
     border: Border,
     weights: Vec<f64>,
     bounds: usize,
@@ -38,9 +37,8 @@ impl Newton {
         let half = |k: Option<usize>| k.and_then(|k| weights.get(k)).map_or(0.0, |w| 0.5 * w);
         let zeros = vec![NodeVector::zeros(); nodes];
         Self {
-            chain: linear.chain.clone(),
+            diagonal: linear.diagonal.clone(),
             factor: Factor::new(weights.len()),
-            links: linear.links.clone(),
             multiplier_step: vec![Rows::zeros(); linear.constraints.len() + pairs.len()],
             border: Border::new(pairs, nodes),
             node_weights: (0..nodes)
@@ -68,35 +66,35 @@ impl Newton {
         bounds: &Bounds,
         counts: impl Fn(f64, f64) -> bool,
     ) {
-        self.chain.stages.copy_from_slice(&linear.chain.stages);
-        self.chain.last_state = linear.chain.last_state;
-        self.chain.first_free = linear.chain.first_free;
-        self.links.copy_from_slice(&linear.links);
-        for (k, stage) in self.chain.stages.iter_mut().enumerate() {
+        self.diagonal
+            .controls
+            .copy_from_slice(&linear.diagonal.controls);
+        for (k, controls) in self.diagonal.controls.iter_mut().enumerate() {
             for (b, gradient) in linear.slacks[k].iter().enumerate().take(self.bounds) {
                 let (slack, multiplier) = (values.slacks[k][b], bounds[k][b]);
                 if counts(slack, multiplier / self.weights[k]) {
-                    stage.controls += multiplier / slack * gradient * gradient.transpose();
+                    *controls += multiplier / slack * gradient * gradient.transpose();
                 }
             }
         }
-        for (i, term) in self.chain.nodes.iter_mut().enumerate() {
+        for (i, term) in self.diagonal.nodes.iter_mut().enumerate() {
             let jacobian = &linear.constraints[i];
-            term.hessian = linear.chain.nodes[i].hessian + jacobian.tr_mul(jacobian) / COMPLIANCE;
+            term.hessian =
+                linear.diagonal.nodes[i].hessian + jacobian.tr_mul(jacobian) / COMPLIANCE;
         }
     }
 
     /// Factorises with just enough damping to be convex on the tangent space of the constraints.
-    pub(super) fn factorise(&mut self) -> Result<(), TooConcave> {
+    pub(super) fn factorise(&mut self, linear: &Linearisation) -> Result<(), TooConcave> {
         const FIRST: f64 = 1e-4;
         const MOST: f64 = 1e12;
-        if self.factorise_damped(0.0).is_ok() {
+        if self.factorise_damped(linear, 0.0).is_ok() {
             return Ok(());
         }
         let known = self.damping > 0.0;
         let mut damping = if known { self.damping / 3.0 } else { FIRST };
         while damping < MOST {
-            if self.factorise_damped(damping).is_ok() {
+            if self.factorise_damped(linear, damping).is_ok() {
                 self.damping = damping;
                 return Ok(());
             }
@@ -106,18 +104,16 @@ impl Newton {
     }
 
     /// Factorises with a given damping of the controls per unit weight.
-    pub(super) fn factorise_damped(&mut self, damping: f64) -> Result<(), TooConcave> {
+    pub(super) fn factorise_damped(
+        &mut self,
+        linear: &Linearisation,
+        damping: f64,
+    ) -> Result<(), TooConcave> {
         let most = self.border.rows();
-        let concave = self
-            .chain
-            .factorise(damping, &self.node_weights, most, &mut self.factor)?;
-        self.border.factorise(
-            &self.chain,
-            &mut self.factor,
-            &self.links,
-            COMPLIANCE,
-            concave,
-        )
+        let (chain, factor) = (&linear.chain, &mut self.factor);
+        let concave = chain.factorise(&self.diagonal, damping, &self.node_weights, most, factor)?;
+        self.border
+            .factorise(chain, factor, &linear.links, COMPLIANCE, concave)
     }
 
     /// Sign of the second variation: positive must hold with the doubtful bounds free, negative with them held, both
@@ -133,13 +129,13 @@ impl Newton {
         self.assemble_where(linear, values, bounds, |slack, multiplier| {
             multiplier > CLEAR * slack
         });
-        if self.factorise_damped(-MARGIN).is_ok() {
+        if self.factorise_damped(linear, -MARGIN).is_ok() {
             return Curvature::Positive;
         }
         self.assemble_where(linear, values, bounds, |slack, multiplier| {
             CLEAR * multiplier > slack
         });
-        if self.factorise_damped(MARGIN).is_ok() {
+        if self.factorise_damped(linear, MARGIN).is_ok() {
             Curvature::Marginal
         } else {
             Curvature::Negative
@@ -164,9 +160,10 @@ impl Newton {
             for (i, target) in at_nodes.iter().enumerate() {
                 let pull =
                     linear.constraints[i].tr_mul(&self.missing(linear, i, target)) / COMPLIANCE;
-                self.right[self.chain.nodes[i].node] += pull;
+                self.right[self.diagonal.nodes[i].node] += pull;
             }
-            self.chain
+            linear
+                .chain
                 .solve(&mut self.factor, &self.right, &mut self.correction);
             self.correct_links(linear, between);
             for (step, correction) in self.step.iter_mut().zip(&self.correction) {
@@ -202,7 +199,7 @@ impl Newton {
 
     /// What the step still misses of a target at a node.
     fn missing(&self, linear: &Linearisation, i: usize, target: &Rows) -> Rows {
-        linear.constraints[i] * self.step[self.chain.nodes[i].node] + target
+        linear.constraints[i] * self.step[self.diagonal.nodes[i].node] + target
     }
 
     /// Change of a slack along the step, to first order.
@@ -214,7 +211,8 @@ impl Newton {
 
     /// Change of the multipliers' work on the constraints along the step, to first order.
     pub(super) fn constraint_work(&self, linear: &Linearisation, multipliers: &[Rows]) -> f64 {
-        let at_node = |(i, rows): (usize, &RowsByNode)| rows * self.step[self.chain.nodes[i].node];
+        let at_node =
+            |(i, rows): (usize, &RowsByNode)| rows * self.step[self.diagonal.nodes[i].node];
         linear
             .constraints
             .iter()

@@ -1,9 +1,9 @@
 //! Constraints that say the same, or the opposite, whatever the point: rank of their derivatives.
 
 use super::border::Border;
-use super::chain::{Factor, Stage};
+use super::chain::Factor;
 use super::{BOUNDS, Linearisation, Program, ROWS, Rows, RowsByNode};
-use nalgebra::{DMatrix, SymmetricEigen};
+use nalgebra::{DMatrix, Matrix4, SymmetricEigen};
 
 /// The constraints whose derivatives depend on each other at a point, by their places among the values: those of nodes
 /// first, then those of pairs.
@@ -16,7 +16,7 @@ pub fn dependent_constraints<P: Program>(program: &P, point: &P::Point) -> Vec<u
     let weights = vec![1.0 / stages as f64; stages + 1];
     if linear
         .chain
-        .factorise(1.0, &weights, 0, &mut factor)
+        .factorise(&linear.diagonal, 1.0, &weights, 0, &mut factor)
         .is_err()
     {
         return Vec::new();
@@ -49,19 +49,14 @@ impl Linearisation {
     /// Keeps of the chain how it carries states and controls on, and nothing of what that costs.
     pub(super) fn forget_second_derivatives(&mut self) {
         for stage in &mut self.chain.stages {
-            *stage = Stage {
-                state_by_state: stage.state_by_state,
-                state_by_first: stage.state_by_first,
-                state_by_second: stage.state_by_second,
-                tie: stage.tie,
-                free: stage.free,
-                ..Stage::zero()
-            };
+            stage.state_first.fill(0.0);
+            stage.state_second.fill(0.0);
         }
-        for term in &mut self.chain.nodes {
+        self.chain.states.clear();
+        self.diagonal.controls.fill(Matrix4::zeros());
+        for term in &mut self.diagonal.nodes {
             term.hessian.fill(0.0);
         }
-        self.chain.last_state.fill(0.0);
     }
 }
 
