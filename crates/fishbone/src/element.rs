@@ -230,7 +230,7 @@ fn fields_by_nodes(t: f64) -> Matrix2x4<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::block::{Block, LANES};
+    use super::block::{Block, LANES, Motions};
     use super::*;
     use crate::solver::chain::{ByControl, NodeVector, Stage};
     use nalgebra::{Matrix3, SMatrix, SVector};
@@ -403,8 +403,13 @@ mod tests {
                 element.geodesic,
                 [w[0], w[1], w[2], w[3]],
             );
-            assert_close(motion.position, Vector3::from(p), 1e-14);
-            assert_close(motion.frame, Matrix3::from_fn(|i, j| e[i][j]), 1e-14);
+            let mut motions = Motions::default();
+            motions.set(3, &element, &w);
+            motions.find();
+            for motion in [motion, motions.at(3)] {
+                assert_close(motion.position, Vector3::from(p), 1e-14);
+                assert_close(motion.frame, Matrix3::from_fn(|i, j| e[i][j]), 1e-14);
+            }
         }
     }
 

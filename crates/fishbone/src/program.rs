@@ -13,7 +13,7 @@ pub use load::{DeadForce, NodeLoad};
 pub use support::{Hold, NodeSupport};
 
 use crate::element::Element;
-use crate::element::block::{Block, LANES};
+use crate::element::block::{Block, LANES, Motions};
 use crate::energy::EnergyModel;
 use crate::lie::{Pose, Twist};
 use crate::solver::chain::NodeVector;
@@ -324,9 +324,23 @@ impl BeltProgram {
 
     /// Carries the poses on from the first, Eq. (3).
     pub fn carry(&self, point: &mut BeltPoint) {
-        for (k, piece) in self.pieces.iter().enumerate() {
-            let motion = piece.motion(&Self::fields_of(&point.fields, k));
-            point.poses[k + 1] = point.poses[k] * motion;
+        let mut motions = Motions::default();
+        let mut pose = point.poses[0];
+        for (pieces, from) in self.pieces.chunks(LANES).zip((0..).step_by(LANES)) {
+            for (lane, piece) in pieces.iter().enumerate() {
+                if let Piece::Strip(element) = piece {
+                    motions.set(lane, element, &Self::fields_of(&point.fields, from + lane));
+                }
+            }
+            motions.find();
+            for (lane, piece) in pieces.iter().enumerate() {
+                let motion = match piece {
+                    Piece::Strip(_) => motions.at(lane),
+                    Piece::Rigid { .. } | Piece::Joint { .. } => piece.motion(&Vector4::zeros()),
+                };
+                pose = pose * motion;
+                point.poses[from + lane + 1] = pose;
+            }
         }
     }
 
@@ -517,45 +531,44 @@ impl BeltProgram {
     /// Derivatives of the elements, block by block; the gradient holds the wrench at every node.
     fn linearise_elements(&self, point: &BeltPoint, bounds: &Bounds, into: &mut Linearisation) {
         let mut block = Block::default();
-        let mut members = [0; LANES];
-        let mut elements = self.elements().peekable();
-        while elements.peek().is_some() {
-            let mut count = 0;
-            for (lane, (k, element)) in elements.by_ref().take(LANES).enumerate() {
-                let fields = Self::fields_of(&point.fields, k);
-                let across = element.across_jets(self.model, &fields).bending;
-                let poses = [&point.poses[k], &point.poses[k + 1]];
-                block.set(
-                    lane,
-                    element,
-                    &fields,
-                    &across,
-                    poses,
-                    &into.gradient[k + 1],
-                );
-                members[lane] = k;
-                count = lane + 1;
+        for (pieces, from) in self.pieces.chunks(LANES).zip((0..).step_by(LANES)) {
+            for (lane, piece) in pieces.iter().enumerate() {
+                let k = from + lane;
+                if let Piece::Strip(element) = piece {
+                    let fields = Self::fields_of(&point.fields, k);
+                    let across = element.across_jets(self.model, &fields).bending;
+                    let poses = [&point.poses[k], &point.poses[k + 1]];
+                    block.set(
+                        lane,
+                        element,
+                        &fields,
+                        &across,
+                        poses,
+                        &into.gradient[k + 1],
+                    );
+                }
             }
             block.differentiate(self.model);
-            for (lane, k) in members[..count].iter().enumerate() {
-                self.take_element(*k, &block, lane, point, &bounds[*k], into);
+            for (lane, piece) in pieces.iter().enumerate() {
+                if let Piece::Strip(element) = piece {
+                    self.take_element(from + lane, element, &block, lane, point, bounds, into);
+                }
             }
         }
     }
 
     /// Takes the derivatives of one element over from its lane, with what its natural bend and its bounds add.
+    #[expect(clippy::too_many_arguments, reason = "the parts of one loop")]
     fn take_element(
         &self,
         k: usize,
+        element: &Element,
         block: &Block,
         lane: usize,
         point: &BeltPoint,
-        bounds: &[f64; BOUNDS],
+        bounds: &Bounds,
         into: &mut Linearisation,
     ) {
-        let Piece::Strip(element) = &self.pieces[k] else {
-            return;
-        };
         let fields = Self::fields_of(&point.fields, k);
         let (mut gradient, mut controls) = (block.gradient(lane), block.hessian(lane));
         if element.curl.bend != 0.0 {
@@ -566,7 +579,7 @@ impl BeltProgram {
         }
         let slacks = element.slack_jets(&fields);
         if !element.strips().has_linear_bounds() {
-            for (slack, multiplier) in slacks.iter().zip(bounds) {
+            for (slack, multiplier) in slacks.iter().zip(&bounds[k]) {
                 controls -= *multiplier * slack.hessian;
             }
         }

@@ -11,7 +11,7 @@ use crate::lie::{Coefficients, Pose, gauss_points};
 use crate::solver::chain::{NodeVector, Stage};
 use crate::strip::SlopeJet;
 use multiversion::multiversion;
-use nalgebra::{Matrix4, Vector4};
+use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 
 /// Elements in a block.
 pub const LANES: usize = 8;
@@ -22,13 +22,19 @@ type Triple = [f64; 3];
 /// The upper triangle of a symmetric 4×4 matrix by rows.
 type Upper = [f64; 10];
 
-/// What the derivatives of a block of elements depend on.
+/// What the motions along a block of elements depend on.
 #[derive(Debug, Clone)]
-struct Input {
+struct Spans {
     /// bend₀, slope₀, bend₁, slope₁.
     fields: [Lanes; 4],
     length: Lanes,
     geodesic: Lanes,
+}
+
+/// What the derivatives of a block of elements depend on.
+#[derive(Debug, Clone)]
+struct Input {
+    spans: Spans,
     rigidity: [Lanes; 2],
     /// What the width makes of the energy: value, gradient and Hessian (upper triangle) by slope₀ and slope₁.
     across: [Lanes; 6],
@@ -64,14 +70,69 @@ pub struct Block {
 
 const NOTHING: Lanes = [0.0; LANES];
 
+impl Spans {
+    /// Elements of no length, which do no harm where a block is not full.
+    const NONE: Self = Self {
+        fields: [NOTHING; 4],
+        length: NOTHING,
+        geodesic: NOTHING,
+    };
+
+    fn set(&mut self, lane: usize, element: &Element, fields: &Vector4<f64>) {
+        for (lanes, field) in self.fields.iter_mut().zip(fields) {
+            lanes[lane] = *field;
+        }
+        (self.length[lane], self.geodesic[lane]) = (element.length, element.geodesic);
+    }
+}
+
+/// The motions along a block of elements.
+#[derive(Debug, Clone)]
+pub struct Motions {
+    spans: Spans,
+    /// Frames, column by column.
+    frame: [Lanes; 9],
+    position: [Lanes; 3],
+}
+
+impl Default for Motions {
+    /// Those along elements of no length.
+    fn default() -> Self {
+        Self {
+            spans: Spans::NONE,
+            frame: [NOTHING; 9],
+            position: [NOTHING; 3],
+        }
+    }
+}
+
+impl Motions {
+    /// Puts an element into a lane.
+    pub fn set(&mut self, lane: usize, element: &Element, fields: &Vector4<f64>) {
+        self.spans.set(lane, element, fields);
+    }
+
+    /// Finds the motions of all lanes: the fourth-order Magnus step of [`Element::increment`].
+    pub fn find(&mut self) {
+        find_motions(&self.spans, &mut self.frame, &mut self.position);
+    }
+
+    /// The motion of a lane.
+    pub fn at(&self, lane: usize) -> Pose {
+        let [x, y, z] = triple(&self.position, 0, lane);
+        Pose {
+            frame: Matrix3::from_iterator(self.frame.iter().map(|entry| entry[lane])),
+            position: Vector3::new(x, y, z),
+        }
+    }
+}
+
 impl Default for Block {
-    /// A block of elements of no length, which do no harm where a block is not full.
+    /// A block of elements of no length.
     fn default() -> Self {
         Self {
             input: Input {
-                fields: [NOTHING; 4],
-                length: NOTHING,
-                geodesic: NOTHING,
+                spans: Spans::NONE,
                 rigidity: [NOTHING; 2],
                 across: [NOTHING; 6],
                 frame: [NOTHING; 9],
@@ -107,7 +168,7 @@ impl Block {
                 lanes[lane] = *value;
             }
         };
-        put(&mut into.fields, fields.as_slice());
+        into.spans.set(lane, element, fields);
         put(&mut into.rigidity, &element.rigidity);
         put(&mut into.frame, first.frame.as_slice());
         put(&mut into.position, first.position.as_slice());
@@ -119,7 +180,6 @@ impl Block {
             &mut into.across[3..],
             &[hessian.m11, hessian.m12, hessian.m22],
         );
-        (into.length[lane], into.geodesic[lane]) = (element.length, element.geodesic);
     }
 
     /// Finds the derivatives of all lanes.
@@ -134,13 +194,15 @@ impl Block {
 
     /// Gradient of bending energy and work by the fields of a lane.
     pub fn gradient(&self, lane: usize) -> Vector4<f64> {
-        Vector4::from_fn(|i, _| self.output.gradient[i][lane])
+        let [a, b, c, d] = &self.output.gradient;
+        Vector4::new(a[lane], b[lane], c[lane], d[lane])
     }
 
     /// Their Hessian.
     pub fn hessian(&self, lane: usize) -> Matrix4<f64> {
-        let entries: Upper = std::array::from_fn(|i| self.output.hessian[i][lane]);
-        Matrix4::from_fn(|i, j| entry(&entries, i, j))
+        let [a, b, c, d, e, f, g, h, i, j] =
+            self.output.hessian.each_ref().map(|entry| entry[lane]);
+        Matrix4::new(a, b, c, d, b, e, f, g, c, f, h, i, d, g, i, j)
     }
 
     /// How the element of a lane carries the twist on.
@@ -166,30 +228,86 @@ fn differentiate<const FISHBONE: bool>(input: &Input, output: &mut Output) {
         true => EnergyModel::Fishbone,
         false => EnergyModel::Sadowsky,
     };
-    let mut coefficients = [NOTHING; 6];
+    let Even { cosine, cubic, .. } = Even::of(&input.spans);
     for lane in 0..LANES {
-        let rotation = Magnus::at(input, lane).rotation;
-        let near = Coefficients::near(dot(rotation, rotation).min(1.0));
-        for i in 0..3 {
-            coefficients[i][lane] = near.cosine[i];
-            coefficients[3 + i][lane] = near.cubic[i];
-        }
-    }
-    for lane in 0..LANES {
-        let rotation = Magnus::at(input, lane).rotation;
-        let square = dot(rotation, rotation);
-        if square >= 1.0 {
-            let far = Coefficients::at(square);
-            for i in 0..3 {
-                coefficients[i][lane] = far.cosine[i];
-                coefficients[3 + i][lane] = far.cubic[i];
-            }
-        }
-    }
-    for lane in 0..LANES {
-        let cosine = three(|i| coefficients[i][lane]);
-        let cubic = three(|i| coefficients[3 + i][lane]);
+        let (cosine, cubic) = (triple(&cosine, 0, lane), triple(&cubic, 0, lane));
         differentiate_lane(model, input, cosine, cubic, lane, output);
+    }
+}
+
+/// The motions of all lanes.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
+fn find_motions(spans: &Spans, frame: &mut [Lanes; 9], position: &mut [Lanes; 3]) {
+    let even = Even::of(spans);
+    for lane in 0..LANES {
+        let step = Magnus::at(spans, lane);
+        let (phi, rho) = (step.rotation, step.translation);
+        let [s, c, q] = [even.sine[lane], even.cosine[0][lane], even.cubic[0][lane]];
+        let (square, along) = (dot(phi, phi), dot(phi, rho));
+        let turned = cross(phi, rho);
+        for i in 0..3 {
+            position[i][lane] = (1.0 - q * square) * rho[i] + c * turned[i] + q * along * phi[i];
+        }
+        let [x, y, z] = phi;
+        let plain = 1.0 - c * square;
+        let columns = [
+            [plain + c * x * x, c * x * y + s * z, c * x * z - s * y],
+            [c * x * y - s * z, plain + c * y * y, c * y * z + s * x],
+            [c * x * z + s * y, c * y * z - s * x, plain + c * z * z],
+        ];
+        for i in 0..3 {
+            frame[i][lane] = columns[0][i];
+            frame[3 + i][lane] = columns[1][i];
+            frame[6 + i][lane] = columns[2][i];
+        }
+    }
+}
+
+/// The even functions of the rotation of every lane, and their derivatives: [`Coefficients`].
+struct Even {
+    sine: Lanes,
+    cosine: [Lanes; 3],
+    cubic: [Lanes; 3],
+}
+
+impl Even {
+    #[inline(always)]
+    fn of(spans: &Spans) -> Self {
+        let mut even = Self {
+            sine: NOTHING,
+            cosine: [NOTHING; 3],
+            cubic: [NOTHING; 3],
+        };
+        let mut widest = 0.0;
+        for lane in 0..LANES {
+            let rotation = Magnus::at(spans, lane).rotation;
+            let square = dot(rotation, rotation);
+            widest = if square > widest { square } else { widest };
+            even.put(lane, &Coefficients::near(square));
+        }
+        if widest > 1.0 {
+            even.put_exact(spans);
+        }
+        even
+    }
+
+    #[inline(always)]
+    fn put(&mut self, lane: usize, coefficients: &Coefficients) {
+        self.sine[lane] = coefficients.sine[0];
+        for i in 0..3 {
+            self.cosine[i][lane] = coefficients.cosine[i];
+            self.cubic[i][lane] = coefficients.cubic[i];
+        }
+    }
+
+    /// The same where rotations are too wide for the series.
+    #[cold]
+    #[inline(never)]
+    fn put_exact(&mut self, spans: &Spans) {
+        for lane in 0..LANES {
+            let rotation = Magnus::at(spans, lane).rotation;
+            self.put(lane, &Coefficients::at(dot(rotation, rotation)));
+        }
     }
 }
 
@@ -208,17 +326,17 @@ struct Magnus {
 
 impl Magnus {
     #[inline(always)]
-    fn at(input: &Input, lane: usize) -> Self {
+    fn at(spans: &Spans, lane: usize) -> Self {
         let [less, more] = gauss_points();
         let [b0, s0, b1, s1] = [
-            input.fields[0][lane],
-            input.fields[1][lane],
-            input.fields[2][lane],
-            input.fields[3][lane],
+            spans.fields[0][lane],
+            spans.fields[1][lane],
+            spans.fields[2][lane],
+            spans.fields[3][lane],
         ];
         let bend = [more * b0 + less * b1, less * b0 + more * b1];
         let slope = [more * s0 + less * s1, less * s0 + more * s1];
-        let (h, geodesic) = (input.length[lane], input.geodesic[lane]);
+        let (h, geodesic) = (spans.length[lane], spans.geodesic[lane]);
         let (half, weight) = (0.5 * h, COMMUTATOR * h * h);
         let [torsion_1, torsion_2] = [-slope[0] * bend[0], -slope[1] * bend[1]];
         Self {
@@ -300,7 +418,7 @@ fn differentiate_lane(
     lane: usize,
     output: &mut Output,
 ) {
-    let step = Magnus::at(input, lane);
+    let step = Magnus::at(&input.spans, lane);
     let frame = three(|i| triple(&input.frame, 3 * i, lane));
     let position = triple(&input.position, 0, lane);
     let next = triple(&input.next, 0, lane);

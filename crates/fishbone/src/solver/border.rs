@@ -107,6 +107,20 @@ impl Border {
             .collect()
     }
 
+    /// Adds the pull of the rows' multipliers at the nodes of every pair.
+    pub(super) fn add_pulls(
+        &self,
+        links: &[[RowsByNode; 2]],
+        multipliers: &[Rows],
+        into: &mut [NodeVector],
+    ) {
+        for ((pair, rows), multipliers) in self.pairs.iter().zip(links).zip(multipliers) {
+            for (node, by_node) in pair.iter().zip(rows) {
+                into[*node] += by_node.tr_mul(multipliers);
+            }
+        }
+    }
+
     /// Change of the rows of every pair along a step.
     pub(super) fn changes(&self, links: &[[RowsByNode; 2]], step: &[NodeVector]) -> Vec<Rows> {
         let change = |(pair, rows): (&[usize; 2], &[RowsByNode; 2])| {

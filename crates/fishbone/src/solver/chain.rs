@@ -7,7 +7,8 @@
 
 use multiversion::multiversion;
 use nalgebra::{
-    Cholesky, Const, Matrix2, Matrix4, Matrix6, SMatrix, SVector, SymmetricEigen, Vector2,
+    ArrayStorage, Cholesky, Const, Matrix2, Matrix4, Matrix6, SMatrix, SVector, SymmetricEigen,
+    Vector2,
 };
 
 /// Unknowns of a node: its state, then its control.
@@ -47,14 +48,15 @@ impl Stage {
         }
     }
 
-    /// The state that the stage carries a node's unknowns and the next control to, with that control.
-    fn carry(&self, node: &NodeVector, second: &Vector2<f64>) -> NodeVector {
+    /// The unknowns of the second node, from those of the first and its own control.
+    #[inline(always)]
+    fn carry(&self, node: &Column, second: [f64; 2]) -> Column {
         let mut next = *node;
-        for j in 0..2 {
-            add_scaled(&mut next, node[6 + j], &self.growth_by_first, j);
-            add_scaled(&mut next, second[j], &self.growth_by_second, j);
-        }
-        (next[6], next[7]) = (second[0], second[1]);
+        add_scaled(&mut next, node[6], &self.growth_by_first.data.0[0]);
+        add_scaled(&mut next, node[7], &self.growth_by_first.data.0[1]);
+        add_scaled(&mut next, second[0], &self.growth_by_second.data.0[0]);
+        add_scaled(&mut next, second[1], &self.growth_by_second.data.0[1]);
+        [next[6], next[7]] = second;
         next
     }
 }
@@ -210,6 +212,21 @@ impl Chain {
         }
     }
 
+    /// Moves a gradient by the states of all nodes to the controls that they grow by and the first state.
+    pub fn carry_back(&self, gradient: &mut [NodeVector]) {
+        for (k, stage) in self.stages.iter().enumerate().rev() {
+            let beyond = gradient[k + 1].data.0[0];
+            for j in 0..2 {
+                gradient[k][6 + j] += dot(&stage.growth_by_first.data.0[j], &beyond);
+                gradient[k + 1][6 + j] += dot(&stage.growth_by_second.data.0[j], &beyond);
+            }
+            for row in 0..6 {
+                gradient[k][row] += beyond[row];
+                gradient[k + 1][row] = 0.0;
+            }
+        }
+    }
+
     /// The step of least cost under a gradient by the unknowns of every node.
     ///
     /// Shapes: `gradient` and `step` have one entry a node.
@@ -225,9 +242,13 @@ impl Chain {
     }
 }
 
+/// The columns of a quadratic form in the unknowns of a node.
+type Columns = [Column; 8];
+type Column = [f64; 8];
+
 /// Eliminates the second control of every stage, from the last to the first; the cost as a function of the first node's
 /// unknowns, and in how many directions it was concave.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx2"))]
 fn eliminate_all(
     chain: &Chain,
     diagonal: &Diagonal,
@@ -237,31 +258,30 @@ fn eliminate_all(
     into: &mut Factor,
 ) -> Result<(NodeMatrix, usize), TooConcave> {
     let mut terms = diagonal.nodes.iter().rev().peekable();
-    let mut cost = NodeMatrix::zeros();
+    let mut cost: Columns = [[0.0; 8]; 8];
     let mut concave = 0;
     for k in (0..weights.len()).rev() {
-        for i in 6..8 {
-            cost[(i, i)] += damping * weights[k];
-        }
+        cost[6][6] += damping * weights[k];
+        cost[7][7] += damping * weights[k];
         if let Some(state) = chain.states.get(k) {
-            let mut own = cost.fixed_view_mut::<6, 6>(0, 0);
-            own += state;
+            for (column, own) in cost.iter_mut().zip(&state.data.0) {
+                for row in 0..6 {
+                    column[row] += own[row];
+                }
+            }
         }
         while let Some(term) = terms.next_if(|term| term.node == k) {
-            cost += term.hessian;
+            for (column, own) in cost.iter_mut().zip(&term.hessian.data.0) {
+                add_scaled(column, 1.0, own);
+            }
         }
         if k > 0 {
             let (stage, controls) = (&chain.stages[k - 1], &diagonal.controls[k - 1]);
-            concave += eliminate(
-                stage,
-                controls,
-                most - concave,
-                &mut cost,
-                &mut into.eliminations[k - 1],
-            )?;
+            let elimination = &mut into.eliminations[k - 1];
+            concave += eliminate(stage, controls, most - concave, &mut cost, elimination)?;
         }
     }
-    Ok((cost, concave))
+    Ok((NodeMatrix::from_array_storage(ArrayStorage(cost)), concave))
 }
 
 /// Eliminates the free part of a stage's second control from the cost beyond it, which becomes that before it; says in how
@@ -271,153 +291,148 @@ fn eliminate(
     stage: &Stage,
     controls: &Matrix4<f64>,
     most: usize,
-    cost: &mut NodeMatrix,
+    cost: &mut Columns,
     into: &mut Elimination,
 ) -> Result<usize, TooConcave> {
+    let [first, second] = [
+        &stage.growth_by_first.data.0,
+        &stage.growth_by_second.data.0,
+    ];
+    let [state_first, state_second] = [&stage.state_first.data.0, &stage.state_second.data.0];
+    let c = &controls.data.0;
     // The cost's derivative by the unknowns beyond, as the second control or the first moves these.
-    let mut by_second = cost.fixed_columns::<2>(6).into_owned();
-    let mut by_first = ByControl::zeros();
+    let mut toward = [cost[6], cost[7]];
+    let mut before = [[0.0; 8]; 2];
+    for i in 0..6 {
+        add_scaled(&mut toward[0], second[0][i], &cost[i]);
+        add_scaled(&mut toward[1], second[1][i], &cost[i]);
+        add_scaled(&mut before[0], first[0][i], &cost[i]);
+        add_scaled(&mut before[1], first[1][i], &cost[i]);
+    }
+    let mixed = toward[1][6] + dot(&second[0], &toward[1]);
+    let mut pivot = [
+        toward[0][6] + dot(&second[0], &toward[0]) + c[2][2],
+        mixed + c[3][2],
+        toward[1][7] + dot(&second[1], &toward[1]) + c[3][3],
+    ];
     for j in 0..2 {
-        for i in 0..6 {
-            for row in 0..8 {
-                by_second[(row, j)] += stage.growth_by_second[(i, j)] * cost[(row, i)];
-                by_first[(row, j)] += stage.growth_by_first[(i, j)] * cost[(row, i)];
-            }
-        }
-    }
-    let mut pivot = Matrix2::zeros();
-    let mut toward = by_second + stage.state_second;
-    for i in 0..2 {
-        for j in 0..2 {
-            pivot[(i, j)] = controls[(2 + i, 2 + j)]
-                + by_second[(6 + i, j)]
-                + dot(&stage.growth_by_second, i, &by_second, j);
-            toward[(6 + i, j)] =
-                controls[(i, 2 + j)] + dot(&stage.growth_by_first, i, &by_second, j);
-            by_first[(6 + i, j)] = controls[(i, j)] + dot(&stage.growth_by_first, i, &by_first, j);
-        }
-    }
-    by_first += stage.state_first;
-    if stage.tie != Vector2::zeros() {
-        follow(stage, &mut pivot, &mut toward, &mut by_first);
-    }
-    for j in 0..2 {
-        for row in 0..8 {
-            cost[(row, 6 + j)] = by_first[(row, j)];
+        let (by_first, by_second) = (before[j], toward[j]);
+        for i in 0..2 {
+            before[j][6 + i] = c[j][i] + dot(&first[i], &by_first);
+            toward[j][6 + i] = c[2 + j][i] + dot(&first[i], &by_second);
         }
         for row in 0..6 {
-            cost[(6 + j, row)] = by_first[(row, j)];
+            before[j][row] += state_first[j][row];
+            toward[j][row] += state_second[j][row];
         }
     }
-    for (i, free) in stage.free.iter().enumerate() {
-        if !free {
-            lock(&mut pivot, i);
-            toward.column_mut(i).fill(0.0);
-        }
+    if stage.tie != Vector2::zeros() {
+        follow(stage, &pivot, &mut toward, &mut before);
     }
-    let (inverse, concave) = invert(&pivot, most)?;
-    let mut gain = ByControl::zeros();
-    for j in 0..2 {
-        for row in 0..8 {
-            gain[(row, j)] =
-                toward[(row, 0)] * inverse[(0, j)] + toward[(row, 1)] * inverse[(1, j)];
-        }
+    for row in 0..6 {
+        cost[row][6] = before[0][row];
+        cost[row][7] = before[1][row];
+    }
+    [cost[6], cost[7]] = before;
+    if !stage.free[0] {
+        (pivot[0], pivot[1], toward[0]) = (1.0, 0.0, [0.0; 8]);
+    }
+    if !stage.free[1] {
+        (pivot[2], pivot[1], toward[1]) = (1.0, 0.0, [0.0; 8]);
+    }
+    let ([a, b, d], concave) = invert(pivot, most)?;
+    let mut gain = [[0.0; 8]; 2];
+    for row in 0..8 {
+        gain[0][row] = toward[0][row] * a + toward[1][row] * b;
+        gain[1][row] = toward[0][row] * b + toward[1][row] * d;
     }
     for column in 0..8 {
         for row in 0..8 {
-            cost[(row, column)] -=
-                gain[(row, 0)] * toward[(column, 0)] + gain[(row, 1)] * toward[(column, 1)];
+            cost[column][row] -=
+                gain[0][row] * toward[0][column] + gain[1][row] * toward[1][column];
         }
     }
-    *into = Elimination { inverse, gain };
+    into.inverse = Matrix2::new(a, b, b, d);
+    into.gain.data.0 = gain;
     Ok(concave)
 }
 
 /// Lets what the second control costs be borne by the first, which it follows.
-#[inline(always)]
-fn follow(
-    stage: &Stage,
-    pivot: &mut Matrix2<f64>,
-    toward: &mut ByControl,
-    by_first: &mut ByControl,
-) {
-    let tie = Matrix2::from_diagonal(&stage.tie);
-    let through = *toward * tie;
-    *by_first += through;
-    let mut own = by_first.fixed_rows_mut::<2>(6);
-    own += through.fixed_rows::<2>(6).transpose() + tie * *pivot * tie;
-    let mut own = toward.fixed_rows_mut::<2>(6);
-    own += tie * *pivot;
+fn follow(stage: &Stage, pivot: &[f64; 3], toward: &mut [Column; 2], before: &mut [Column; 2]) {
+    let full = [[pivot[0], pivot[1]], [pivot[1], pivot[2]]];
+    let tie = [stage.tie[0], stage.tie[1]];
+    for j in 0..2 {
+        add_scaled(&mut before[j], tie[j], &toward[j]);
+        for i in 0..2 {
+            before[j][6 + i] += tie[i] * (toward[i][6 + j] + full[i][j] * tie[j]);
+        }
+    }
+    for j in 0..2 {
+        for i in 0..2 {
+            toward[j][6 + i] += tie[i] * full[i][j];
+        }
+    }
 }
 
 /// Gradient of the cost-to-go by the first node's unknowns; leaves every stage's pull behind.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx2"))]
 fn gather(chain: &Chain, factor: &mut Factor, gradient: &[NodeVector]) -> NodeVector {
-    let mut cost = gradient[chain.stages.len()];
-    let stages = chain
-        .stages
-        .iter()
-        .zip(&factor.eliminations)
-        .zip(&mut factor.pulls);
-    for (((stage, e), pull), own) in stages.zip(gradient).rev() {
-        let mut before = *own;
-        let mut second = [0.0; 2];
+    let mut cost = gradient[chain.stages.len()].data.0[0];
+    let stages = chain.stages.iter().zip(&factor.eliminations);
+    let nodes = factor.pulls.iter_mut().zip(gradient);
+    for ((stage, e), (pull, own)) in stages.zip(nodes).rev() {
+        let [first, second] = [
+            &stage.growth_by_first.data.0,
+            &stage.growth_by_second.data.0,
+        ];
+        let mut before = own.data.0[0];
+        let mut toward = [0.0; 2];
         for j in 0..2 {
-            let by_first = dot(&stage.growth_by_first, j, &cost, 0);
-            let by_second = cost[6 + j] + dot(&stage.growth_by_second, j, &cost, 0);
-            before[6 + j] += by_first + stage.tie[j] * by_second;
-            second[j] = if stage.free[j] { by_second } else { 0.0 };
+            let by_second = cost[6 + j] + dot(&second[j], &cost);
+            before[6 + j] += dot(&first[j], &cost) + stage.tie[j] * by_second;
+            toward[j] = if stage.free[j] { by_second } else { 0.0 };
         }
         for row in 0..6 {
             before[row] += cost[row];
         }
-        for j in 0..2 {
-            add_scaled(&mut before, -second[j], &e.gain, j);
-        }
-        *pull = e.inverse * Vector2::from(second);
+        add_scaled(&mut before, -toward[0], &e.gain.data.0[0]);
+        add_scaled(&mut before, -toward[1], &e.gain.data.0[1]);
+        *pull = e.inverse * Vector2::from(toward);
         cost = before;
     }
-    cost
+    NodeVector::from(cost)
 }
 
 /// Carries a step on from the first node along the chain, every control as it was eliminated.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx2"))]
 fn spread(chain: &Chain, factor: &Factor, step: &mut [NodeVector]) {
-    let mut node = step[0];
-    let stages = chain
-        .stages
-        .iter()
-        .zip(&factor.eliminations)
-        .zip(&factor.pulls);
-    for (((stage, e), pull), next) in stages.zip(&mut step[1..]) {
-        let second = [0, 1].map(|j| {
-            let own =
-                dot(&e.gain, j, &node, 0) + e.gain[(6, j)] * node[6] + e.gain[(7, j)] * node[7];
-            stage.tie[j] * node[6 + j] - pull[j] - own
-        });
-        node = stage.carry(&node, &Vector2::from(second));
-        *next = node;
+    let mut node = step[0].data.0[0];
+    let stages = chain.stages.iter().zip(&factor.eliminations);
+    let next = factor.pulls.iter().zip(&mut step[1..]);
+    for ((stage, e), (pull, next)) in stages.zip(next) {
+        let mut second = [0.0; 2];
+        for j in 0..2 {
+            let gain = &e.gain.data.0[j];
+            let own = dot(gain, &node) + (gain[6] * node[6] + gain[7] * node[7]);
+            second[j] = stage.tie[j] * node[6 + j] - pull[j] - own;
+        }
+        node = stage.carry(&node, second);
+        next.data.0[0] = node;
     }
 }
 
 /// Adds a multiple of a column.
 #[inline(always)]
-fn add_scaled(into: &mut NodeVector, by: f64, matrix: &ByControl, column: usize) {
+fn add_scaled(into: &mut Column, by: f64, column: &Column) {
     for row in 0..8 {
-        into[row] += by * matrix[(row, column)];
+        into[row] += by * column[row];
     }
 }
 
-/// Scalar product of the states in two columns.
+/// Scalar product of two states.
 #[inline(always)]
-fn dot<const A: usize, const B: usize>(
-    a: &SMatrix<f64, 8, A>,
-    i: usize,
-    b: &SMatrix<f64, 8, B>,
-    j: usize,
-) -> f64 {
-    let product = |row: usize| a[(row, i)] * b[(row, j)];
-    (product(0) + product(1)) + (product(2) + product(3)) + (product(4) + product(5))
+fn dot(a: &Column, b: &Column) -> f64 {
+    (a[0] * b[0] + a[1] * b[1]) + (a[2] * b[2] + a[3] * b[3]) + (a[4] * b[4] + a[5] * b[5])
 }
 
 /// Makes an entry of the unknowns its own, unit, equation.
@@ -428,10 +443,10 @@ fn lock<const N: usize>(matrix: &mut SMatrix<f64, N, N>, entry: usize) {
     matrix[(entry, entry)] = 1.0;
 }
 
-/// Inverse of a symmetric 2×2 matrix with at most so many negative eigenvalues, and their number.
+/// Inverse of a symmetric 2×2 matrix, by its entries (0, 0), (0, 1) and (1, 1), with at most so many negative
+/// eigenvalues, and their number.
 #[inline(always)]
-fn invert(m: &Matrix2<f64>, most: usize) -> Result<(Matrix2<f64>, usize), TooConcave> {
-    let (a, b, d) = (m[(0, 0)], 0.5 * (m[(0, 1)] + m[(1, 0)]), m[(1, 1)]);
+fn invert([a, b, d]: [f64; 3], most: usize) -> Result<([f64; 3], usize), TooConcave> {
     let determinant = a * d - b * b;
     let floor = f64::EPSILON * (a * d).abs().max(b * b);
     let negative = if determinant < 0.0 {
@@ -446,7 +461,8 @@ fn invert(m: &Matrix2<f64>, most: usize) -> Result<(Matrix2<f64>, usize), TooCon
     if !regular || negative > most {
         return Err(TooConcave);
     }
-    Ok((Matrix2::new(d, -b, -b, a) / determinant, negative))
+    let inverse = 1.0 / determinant;
+    Ok(([d * inverse, -b * inverse, a * inverse], negative))
 }
 
 #[cfg(test)]
@@ -471,7 +487,7 @@ impl Chain {
     /// Carries the states of a step along the chain from its first state and its controls.
     pub(crate) fn carry(&self, step: &mut [NodeVector]) {
         for (k, stage) in self.stages.iter().enumerate() {
-            let second = Vector2::from_fn(|i, _| {
+            let second = [0, 1].map(|i| {
                 let free = if stage.free[i] {
                     step[k + 1][6 + i]
                 } else {
@@ -479,7 +495,7 @@ impl Chain {
                 };
                 stage.tie[i] * step[k][6 + i] + free
             });
-            step[k + 1] = stage.carry(&step[k], &second);
+            step[k + 1] = NodeVector::from(stage.carry(&step[k].data.0[0], second));
         }
     }
 

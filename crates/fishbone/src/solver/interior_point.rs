@@ -40,6 +40,8 @@ struct State<'a, P: Program> {
     barrier: f64,
     iteration: usize,
     interrupted: bool,
+    /// Whether the derivatives are those of the restoration.
+    restoring: bool,
     admissible: bool,
     linear: Linearisation,
     newton: Newton,
@@ -83,6 +85,7 @@ impl<'a, P: Program> State<'a, P> {
             barrier: settings.barrier,
             iteration: 0,
             interrupted: false,
+            restoring: false,
             admissible,
             gradient: linear.gradient.clone(),
             plain_step: linear.gradient.clone(),
@@ -103,7 +106,8 @@ impl<'a, P: Program> State<'a, P> {
             return Outcome::Inadmissible;
         }
         loop {
-            if self.residuals(0.0).largest() <= self.settings.tolerance {
+            let residuals = self.residuals();
+            if residuals.largest() <= self.settings.tolerance {
                 return Outcome::Converged;
             }
             if self.values.objective < -BOTTOMLESS {
@@ -115,7 +119,7 @@ impl<'a, P: Program> State<'a, P> {
             if self.is_interrupted(proceed) {
                 return Outcome::Interrupted;
             }
-            self.lower_barrier();
+            self.lower_barrier(&residuals);
             self.newton
                 .assemble(&self.linear, &self.values, &self.bound_multipliers);
             if self.newton.factorise(&self.linear).is_err() {
@@ -139,14 +143,15 @@ impl<'a, P: Program> State<'a, P> {
     }
 
     fn finish(mut self, outcome: Outcome) -> Solution<P::Point> {
-        // A failed restoration leaves its own derivatives behind.
-        self.linearise();
+        if self.restoring {
+            self.linearise();
+        }
         self.prefer_zero_multipliers();
         let curvature = self
             .newton
             .curvature(&self.linear, &self.values, &self.bound_multipliers);
         Solution {
-            residuals: self.residuals(0.0),
+            residuals: self.residuals(),
             point: self.point,
             values: self.values,
             multipliers: self.multipliers,
@@ -161,18 +166,17 @@ impl<'a, P: Program> State<'a, P> {
     /// A loose tolerance must not do so: it would call small forces none.
     fn prefer_zero_multipliers(&mut self) {
         const NONE: f64 = 1e-8;
-        let found = std::mem::replace(
-            &mut self.multipliers,
-            vec![Rows::zeros(); self.targets.len()],
-        );
-        self.linearise();
-        if self.residuals(0.0).largest() > NONE.min(self.settings.tolerance) {
-            self.multipliers = found;
+        self.gradient.copy_from_slice(&self.linear.gradient);
+        self.newton
+            .take_off_pulls(&self.linear, &self.multipliers, &mut self.gradient);
+        if self.stationarity() <= NONE.min(self.settings.tolerance) {
+            self.multipliers.fill(Rows::zeros());
             self.linearise();
         }
     }
 
     fn linearise(&mut self) {
+        self.restoring = false;
         self.program.linearise(
             &self.point,
             &self.multipliers,
@@ -181,10 +185,17 @@ impl<'a, P: Program> State<'a, P> {
         );
     }
 
-    /// Residuals of the conditions in which slack times multiplier is `barrier` times the stage's weight.
-    fn residuals(&mut self, barrier: f64) -> Residuals {
+    fn residuals(&mut self) -> Residuals {
         self.gradient.copy_from_slice(&self.linear.gradient);
-        let mut complementarity = 0.0;
+        Residuals {
+            stationarity: self.stationarity(),
+            constraint: largest(self.values.constraints.iter().flatten()),
+            complementarity: self.complementarity(0.0),
+        }
+    }
+
+    /// Largest entry of the gradient once the bounds' multipliers are taken off.
+    fn stationarity(&mut self) -> f64 {
         for (k, multipliers) in self.bound_multipliers.iter().enumerate() {
             for (b, multiplier) in multipliers.iter().enumerate().take(self.bounds) {
                 add_controls(
@@ -192,25 +203,34 @@ impl<'a, P: Program> State<'a, P> {
                     k,
                     &(-*multiplier * self.linear.slacks[k][b]),
                 );
-                let product = multiplier * self.values.slacks[k][b] - barrier * self.weights[k];
-                complementarity = larger(complementarity, product.abs());
             }
         }
         self.linear.chain.fold(&mut self.gradient);
-        Residuals {
-            stationarity: largest(self.gradient.iter().flatten()),
-            constraint: largest(self.values.constraints.iter().flatten()),
-            complementarity,
-        }
+        largest(self.gradient.iter().flatten())
     }
 
-    /// Lowers the barrier while its problem is solved well enough.
-    fn lower_barrier(&mut self) {
+    /// By how much slacks times their multipliers differ from `barrier` times the stage's weight.
+    fn complementarity(&self, barrier: f64) -> f64 {
+        let stages = self.bound_multipliers.iter().zip(&self.values.slacks);
+        let product = |(k, (multipliers, slacks)): (usize, (&[f64; BOUNDS], &[f64; BOUNDS]))| {
+            let pairs = multipliers.iter().zip(slacks).take(self.bounds);
+            let target = barrier * self.weights[k];
+            pairs.fold(0.0, |most, (a, b)| larger(most, (a * b - target).abs()))
+        };
+        stages.enumerate().map(product).fold(0.0, larger)
+    }
+
+    /// Lowers the barrier while its problem is solved well enough; `residuals` are those without a barrier.
+    fn lower_barrier(&mut self, residuals: &Residuals) {
         const SOLVED: f64 = 10.0;
         let heaviest = largest(self.weights.iter());
         let least = 0.1 * self.settings.tolerance / heaviest;
+        let left = |barrier: f64, state: &Self| Residuals {
+            complementarity: state.complementarity(barrier),
+            ..*residuals
+        };
         while self.barrier > least
-            && self.residuals(self.barrier).largest() <= SOLVED * self.barrier * heaviest
+            && left(self.barrier, self).largest() <= SOLVED * self.barrier * heaviest
         {
             self.barrier = least.max((0.2 * self.barrier).min(self.barrier.powf(1.5)));
             self.filter.clear();
@@ -423,6 +443,7 @@ impl<'a, P: Program> State<'a, P> {
         const SHORTEST: f64 = 1e-8;
         const SUFFICIENT: f64 = 1e-4;
         self.linearise();
+        self.restoring = true;
         self.linear.forget_second_derivatives();
         self.linear.gradient.fill(NodeVector::zeros());
         self.newton

@@ -197,6 +197,26 @@ impl Newton {
         }
     }
 
+    /// Takes the pull of the constraints' multipliers off a gradient by the unknowns.
+    pub(super) fn take_off_pulls(
+        &mut self,
+        linear: &Linearisation,
+        multipliers: &[Rows],
+        gradient: &mut [NodeVector],
+    ) {
+        let (at_nodes, between) = multipliers.split_at(linear.constraints.len());
+        self.right.fill(NodeVector::zeros());
+        for (i, rows) in at_nodes.iter().enumerate() {
+            self.right[self.diagonal.nodes[i].node] += linear.constraints[i].tr_mul(rows);
+        }
+        self.border
+            .add_pulls(&linear.links, between, &mut self.right);
+        linear.chain.carry_back(&mut self.right);
+        for (gradient, pull) in gradient.iter_mut().zip(&self.right) {
+            *gradient -= pull;
+        }
+    }
+
     /// What the step still misses of a target at a node.
     fn missing(&self, linear: &Linearisation, i: usize, target: &Rows) -> Rows {
         linear.constraints[i] * self.step[self.diagonal.nodes[i].node] + target
