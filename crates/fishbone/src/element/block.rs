@@ -453,8 +453,8 @@ fn differentiate_lane(
     for i in 0..4 {
         output.gradient[i][lane] = by_work[i] + factor * by_energy[i] + energy.value * by_width[i];
     }
-    for i in 0..10 {
-        output.hessian[i][lane] = hessian[i];
+    for (into, value) in output.hessian.iter_mut().zip(hessian) {
+        into[lane] = value;
     }
 
     let turns = triples_by_nodes(&twists.rotation);
