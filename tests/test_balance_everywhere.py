@@ -57,6 +57,8 @@ LOADS: list[Json] = [
     {"at": 0.7, "force": [0.3, -0.2, 0.4], "lever": [0.05, -0.02, 0.04]},
 ]
 LINK: Json = {"from": 0.3, "to": 0.7, "offset": [0.0, 0.24, 0.03]}
+SLACK_LINK: Json = {"from": 0.6, "to": 0.9, "offset": [-0.1, 0.18, 0.03]}
+"""Beside a pin at 0.5, the offset of the other would lock the belt: its energy has no limit as the mesh gets finer."""
 ELL = [straight(0.5), corner(math.pi / 3.0), straight(0.5)]
 ROUNDED = [straight(0.4), arc(0.2, math.pi / 0.6), straight(0.4)]
 STIFFER = straight(0.15, rigidity=2.0)
@@ -95,7 +97,7 @@ CASES: dict[str, Callable[[], Json]] = {
     "hinge": make(PLAIN, [START, HINGE]),
     "link": make(PLAIN, [START, END], links=[LINK]),
     "link on a cantilever": make(PLAIN, [START], links=[LINK]),
-    "link and loads": make(PLAIN, [START, PIN, END], links=[{**LINK, "from": 0.6, "to": 0.9}], points=LOADS, **WEIGHT),
+    "link and loads": make(PLAIN, [START, PIN, END], links=[SLACK_LINK], points=LOADS, **WEIGHT),
     "held inside only": make(PLAIN, [{**PIN, "rotation": [0.0, 0.0, 0.3]}], points=LOADS, **WEIGHT),
 }
 CLOSED: dict[str, Callable[[], Json]] = {

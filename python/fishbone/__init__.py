@@ -28,21 +28,26 @@ from fishbone.errors import (
     InvalidArgument,
     InvalidScenario,
     MissingPackage,
+    NoSensitivity,
     NoSupport,
     NotConverged,
 )
 from fishbone.scenario import Scenario, load
+from fishbone.sensitivity import Change, Gradient, Sensitivity
 
 __all__ = [
     "BendRadius",
+    "Change",
     "Edges",
     "Equilibrium",
     "FishboneError",
+    "Gradient",
     "HighestPoint",
     "Internal",
     "InvalidArgument",
     "InvalidScenario",
     "MissingPackage",
+    "NoSensitivity",
     "NoSupport",
     "NotConverged",
     "Outline",
@@ -50,6 +55,7 @@ __all__ = [
     "Residuals",
     "RibMargin",
     "Scenario",
+    "Sensitivity",
     "SpineRadius",
     "__version__",
     "load",

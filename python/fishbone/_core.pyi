@@ -4,7 +4,7 @@ from typing import Final, Literal, final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Equilibrium", "Scenario", "__version__", "solve", "solve_many"]
+__all__ = ["Equilibrium", "Scenario", "Sensitivity", "__version__", "solve", "solve_many"]
 
 __version__: Final[str]
 
@@ -89,7 +89,26 @@ class Equilibrium:
     def rib_feet(self, flat: list[_Row]) -> _Floats: ...
     @property
     def stiffeners(self) -> list[tuple[float, float]]: ...
+    def sensitivity(self) -> Sensitivity: ...
     def to_json(self) -> str: ...
+
+@final
+class Sensitivity:
+    @property
+    def shape(self) -> tuple[int, int, int]: ...
+    def forward(
+        self, supports: _Floats, rigidity: _Floats, natural_bend: _Floats, width: float, gravity: _Row
+    ) -> tuple[_Floats, _Floats, _Floats, _Floats, _Floats, float]: ...
+    def adjoint(
+        self,
+        position: _Floats,
+        rotation: _Floats,
+        bend: _Floats,
+        rib_slope: _Floats,
+        reactions: _Floats,
+        energy: float,
+    ) -> tuple[_Floats, _Floats, _Floats, float, _Row]: ...
+    def jacobian(self, support: int) -> _Floats: ...
 
 def solve(scenario: Scenario) -> Equilibrium: ...
 def solve_many(

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 
 from fishbone import _core
-from fishbone.errors import InvalidArgument, NoSupport, NotConverged
+from fishbone.errors import InvalidArgument, NoSensitivity, NoSupport, NotConverged
+from fishbone.sensitivity import Sensitivity
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -118,11 +119,12 @@ class Equilibrium:
     Units: those of the scenario; angles in rad.
     """
 
-    __slots__ = ("_inner", "scenario")
+    __slots__ = ("_inner", "_sensitivity", "scenario")
 
     def __init__(self, scenario: Scenario, inner: _core.Equilibrium) -> None:
         self.scenario = scenario
         self._inner = inner
+        self._sensitivity: Sensitivity | None = None
 
     @property
     def status(self) -> Status:
@@ -307,16 +309,40 @@ class Equilibrium:
 
         Errors: `NoSupport`.
         """
-        reactions = self._inner.reactions
-        try:
-            _, force, moment = reactions[self._support_index(support)]
-        except IndexError:
-            raise NoSupport(f"support {support!r}: found {len(reactions)} supports") from None
+        _, force, moment = self._inner.reactions[self._support_index(support)]
         return Reaction(np.array(force), np.array(moment))
+
+    def sensitivity(self) -> Sensitivity:
+        """The derivatives of everything by what the scenario says, as one factorised system: made once, used often.
+
+        Errors: `NoSensitivity` unless the equilibrium has converged to a minimum that its supports determine.
+        """
+        if self._sensitivity is None:
+            try:
+                self._sensitivity = Sensitivity(self._inner.sensitivity())
+            except ValueError as error:
+                raise NoSensitivity(str(error)) from None
+        return self._sensitivity
+
+    def jacobian(self, support: Literal["start", "end"] | float) -> Floats:
+        """Derivatives of the spine's positions by the motion of a support, which is named as for `reaction`.
+
+        The last axis is [translation, left world-axes rotation about the support point]; components that the support
+        leaves free move nothing. For other derivatives, and for single directions at less cost, see `sensitivity`.
+
+        Shapes: (n, 3, 6).
+        Errors: `NoSupport`; `NoSensitivity` unless the equilibrium has converged to a minimum that its supports
+        determine.
+        """
+        return self.sensitivity().jacobian(self._support_index(support))
 
     def _support_index(self, support: Literal["start", "end"] | float) -> int:
         if isinstance(support, int | np.integer):
-            return int(support)
+            count = len(self._inner.reactions)
+            try:
+                return range(count)[int(support)]
+            except IndexError:
+                raise NoSupport(f"support {support!r}: found {count} supports") from None
         length = float(self.u[-1])
         place = {"start": 0.0, "end": length}.get(support) if isinstance(support, str) else float(support)
         places = [at for at, _, _ in self._inner.reactions]

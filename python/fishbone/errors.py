@@ -24,6 +24,10 @@ class NoSupport(FishboneError, LookupError):  # noqa: N818
     """There is no support where one was asked for."""
 
 
+class NoSensitivity(FishboneError):  # noqa: N818
+    """A shape has no derivatives: it is no equilibrium, no minimum, or not determined by its supports."""
+
+
 class MissingPackage(FishboneError, ImportError):  # noqa: N818
     """An optional package is not installed; the message says how to get it."""
 

@@ -1,6 +1,6 @@
 //! From the core's vectors to NumPy arrays: float64, C order, one row a node.
 
-use nalgebra::{Matrix3, Vector2, Vector3};
+use nalgebra::{Matrix3, Matrix3x6, Vector2, Vector3};
 use numpy::ndarray::{Array2, Array3};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3};
 use pyo3::exceptions::PyRuntimeError;
@@ -22,6 +22,18 @@ pub(crate) fn points<'a, 'py>(
     vectors: impl IntoIterator<Item = &'a Vector3<f64>>,
 ) -> Points<'py> {
     let rows: Vec<[f64; 3]> = vectors.into_iter().map(row).collect();
+    Array2::from(rows).into_pyarray(py)
+}
+
+/// Shapes: (n, 6).
+pub(crate) fn doubles(
+    py: Python<'_>,
+    pairs: impl IntoIterator<Item = [Vector3<f64>; 2]>,
+) -> Points<'_> {
+    let rows: Vec<[f64; 6]> = pairs
+        .into_iter()
+        .map(|[a, b]| [a.x, a.y, a.z, b.x, b.y, b.z])
+        .collect();
     Array2::from(rows).into_pyarray(py)
 }
 
@@ -47,6 +59,15 @@ pub(crate) fn frames<'a, 'py>(
     let rows: Vec<[[f64; 3]; 3]> = frames
         .into_iter()
         .map(|frame| frame.transpose().into())
+        .collect();
+    Array3::from(rows).into_pyarray(py)
+}
+
+/// Shapes: (n, 3, 6).
+pub(crate) fn matrices<'py>(py: Python<'py>, matrices: &[Matrix3x6<f64>]) -> Grid<'py> {
+    let rows: Vec<[[f64; 6]; 3]> = matrices
+        .iter()
+        .map(|matrix| matrix.transpose().into())
         .collect();
     Array3::from(rows).into_pyarray(py)
 }

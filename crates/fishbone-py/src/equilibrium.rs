@@ -2,6 +2,7 @@
 
 use crate::array::{self, Grid, Points, Scalars, Triangles};
 use crate::scenario::Scenario;
+use crate::sensitivity::{Sensitivity, refused};
 use fishbone::equilibrium::{self, Status, Wrench};
 use fishbone::spine::Piece;
 use fishbone::surface::{self, Curve, Rib};
@@ -364,6 +365,14 @@ impl Equilibrium {
             .filter(|(_, piece)| matches!(piece, Piece::Rigid))
             .map(|(element, _)| (spine.u[element], spine.u[element + 1]))
             .collect()
+    }
+
+    /// Its first-order conditions, factorised with the GIL released.
+    ///
+    /// Errors: `ValueError`, one line, where it has no derivatives.
+    fn sensitivity(&self, py: Python<'_>) -> PyResult<Sensitivity> {
+        let sensitivity = py.detach(|| self.solved.sensitivity());
+        sensitivity.map(Sensitivity::new).map_err(refused)
     }
 
     /// The result schema as JSON, without `solve_time`.

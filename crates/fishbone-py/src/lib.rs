@@ -4,6 +4,7 @@ mod array;
 mod batch;
 mod equilibrium;
 mod scenario;
+mod sensitivity;
 
 /// The compiled core of fishbone; `fishbone` itself is its public face.
 #[pyo3::pymodule]
@@ -14,6 +15,8 @@ mod _core {
     use crate::equilibrium::{Equilibrium, solve};
     #[pymodule_export]
     use crate::scenario::Scenario;
+    #[pymodule_export]
+    use crate::sensitivity::Sensitivity;
 
     #[pymodule_export]
     #[expect(non_upper_case_globals, reason = "the name Python expects")]

@@ -1,6 +1,6 @@
 //! Bending energy of the belt per unit length of the spine: the three models, Eq. (34) and its successors.
 
-use crate::strip::Across;
+use crate::strip::{Across, Scaled};
 use nalgebra::{Matrix2, Vector2};
 use num_dual::DualNum;
 use schemars::JsonSchema;
@@ -21,9 +21,9 @@ pub enum EnergyModel {
 
 /// The bend that a belt has of itself.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Curl {
+pub struct Curl<W = f64> {
     /// Natural bend k, the ω_ζ of the unloaded belt.
-    pub bend: f64,
+    pub bend: W,
     /// Poisson's ratio ν, which says what bending along the curl does across it.
     pub poisson: f64,
 }
@@ -61,11 +61,11 @@ impl EnergyModel {
     /// it and takes the bracket times sqrt(1+β²).
     ///
     /// Source: Eq. (29), (34), in β: written in ω_η/ω_ζ it is singular where the belt is not bent.
-    pub fn value<D: DualNum<Primitive = f64> + Copy>(
+    pub fn value<W: DualNum<Primitive = f64> + Copy, D: Scaled<W>>(
         self,
         bend: D,
         slope: D,
-        curl: &Curl,
+        curl: &Curl<W>,
         across: &Across<D>,
     ) -> D {
         let across = match self.knows_width() {
@@ -79,7 +79,7 @@ impl EnergyModel {
             Self::Sadowsky | Self::Wunderlich => D::one(),
         };
         let bent = bend * bend * stretch * stretch * across.bending;
-        let mixed = bend * (square * curl.poisson + 1.0) * across.length * (-2.0 * curl.bend);
+        let mixed = bend * (square * curl.poisson + 1.0) * across.length * (curl.bend * -2.0);
         let natural = across.area * curl.bend.powi(2);
         (bent + mixed + natural) * factor * 0.5
     }

@@ -7,8 +7,9 @@ mod ritz;
 mod search;
 
 use crate::belt::Belt;
+use crate::program::{BeltPoint, BeltProgram};
 use crate::scenario::{BeltSpec, LinkSpec, Method, Scenario, SupportSpec};
-use crate::solver::Residuals;
+use crate::solver::{Bounds, Curvature, Residuals, Rows};
 use crate::spine::Spine;
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -85,13 +86,32 @@ pub struct Equilibrium {
     pub residuals: Residuals,
     /// Iterations, over all attempts.
     pub iterations: usize,
+    /// The programme that was solved; `None` where the method knows no multipliers.
+    pub(crate) solved: Option<Solved>,
+}
+
+/// A programme and its solution.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Solved {
+    pub(crate) program: BeltProgram,
+    pub(crate) point: BeltPoint,
+    pub(crate) multipliers: Vec<Rows>,
+    pub(crate) bound_multipliers: Bounds,
+    pub(crate) curvature: Curvature,
+    pub(crate) units: Units,
+    /// Where the programme has its origin.
+    pub(crate) origin: Vector3<f64>,
+    /// The supports and links that hold the same twice over, by name.
+    pub(crate) said_twice: Option<String>,
+    /// Whether a part of the belt has stayed flat under load.
+    pub(crate) is_flat: bool,
 }
 
 /// Units of length and energy of a programme in which lengths are in U and energy in mean R_f/U.
-#[derive(Debug, Clone, Copy)]
-struct Units {
-    length: f64,
-    energy: f64,
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Units {
+    pub(crate) length: f64,
+    pub(crate) energy: f64,
 }
 
 impl Units {
@@ -103,7 +123,7 @@ impl Units {
     }
 
     /// The unit of force.
-    fn force(&self) -> f64 {
+    pub(crate) fn force(&self) -> f64 {
         self.energy / self.length
     }
 }

@@ -40,6 +40,7 @@ pub mod program;
 pub mod result;
 pub mod ritz;
 pub mod scenario;
+pub mod sensitivity;
 pub mod solver;
 pub mod spine;
 pub mod strip;

@@ -9,7 +9,9 @@ mod load;
 mod support;
 
 pub use link::{NodeLink, Tie};
+pub(crate) use load::weight;
 pub use load::{DeadForce, NodeLoad};
+pub(crate) use support::Turn;
 pub use support::{Hold, NodeSupport};
 
 use crate::element::Element;
@@ -44,7 +46,7 @@ pub enum Piece {
 }
 
 /// The programme of a belt. Lengths are in U and energies in mean R_f/U.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct BeltProgram {
     /// Pieces in order along the spine.
     pub pieces: Vec<Piece>,
@@ -65,7 +67,7 @@ pub struct BeltProgram {
 }
 
 /// A shape of the belt.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct BeltPoint {
     /// Bend and rib slope at every node.
     pub fields: Vec<Vector2<f64>>,

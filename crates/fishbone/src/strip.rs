@@ -5,6 +5,18 @@
 use crate::solver::BOUNDS;
 use nalgebra::{Matrix2, Vector2};
 use num_dual::{Derivative, Dual2SVec64, DualNum};
+use std::ops::{Div, Mul};
+
+/// A number, it may be with derivatives, that numbers of another kind may multiply: the width is mostly a plain one.
+pub trait Scaled<W>:
+    DualNum<Primitive = f64> + Copy + Mul<W, Output = Self> + Div<W, Output = Self>
+{
+}
+
+impl<W, D> Scaled<W> for D where
+    D: DualNum<Primitive = f64> + Copy + Mul<W, Output = D> + Div<W, Output = D>
+{
+}
 
 /// What the density's terms are multiplied by to hold for the whole width: integrals over v from the rib's one end v₋ to
 /// the other v₊, divided by V.
@@ -97,13 +109,13 @@ impl From<Dual2SVec64<2>> for SlopeJet {
 
 /// A line or an arc of the board's outline as seen from the foot of a rib, by the tangent nearest to the foot.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Edge {
+pub struct Edge<W = f64> {
     /// Direction of that tangent along and across the spine at the foot, (cos δ, sin δ).
     pub direction: Vector2<f64>,
     /// Its distance c from the foot, negative on the −ζ side.
-    pub distance: f64,
+    pub distance: W,
     /// Curvature, 0 of a line; towards the side on which the edge lies.
-    pub curvature: f64,
+    pub curvature: W,
     /// Turns of its first and last tangent from the nearest one, rising.
     pub turn: [f64; 2],
 }
@@ -119,21 +131,32 @@ impl Edge {
         }
     }
 
+    /// The same edge in other units: lengths times a factor.
+    pub fn scaled(&self, factor: f64) -> Self {
+        Self {
+            distance: self.distance * factor,
+            curvature: self.curvature / factor,
+            ..*self
+        }
+    }
+}
+
+impl<W: DualNum<Primitive = f64> + Copy> Edge<W> {
     /// How far ribs are from crossing before they reach the edge: the least of `cos δ + β sin δ − s c` over its tangents.
     ///
     /// A rib meets a tangent at v = c/(cos δ + β sin δ), so this is 1 − s v in other words; but it counts a rib so
     /// steep that it passes the edge by as crossing others.
-    pub fn slack<D: DualNum<Primitive = f64> + Copy>(&self, slope: D, s: D) -> D {
+    pub fn slack<D: Scaled<W>>(&self, slope: D, s: D) -> D {
         let (along, across) = (self.direction.x, self.direction.y);
         let nearest = slope * across - s * self.distance + along;
-        if self.curvature == 0.0 {
+        if self.curvature.re() == 0.0 {
             return nearest;
         }
         // Over the tangents it is a sine of their turn.
         let quarter = slope * along - across;
-        let (k, side) = (self.curvature, self.curvature.signum());
+        let (k, side) = (self.curvature, self.curvature.re().signum());
         let beyond = s - nearest * k;
-        let lowest = (-quarter.re() * k.abs()).atan2(side * beyond.re());
+        let lowest = (-quarter.re() * k.re().abs()).atan2(side * beyond.re());
         if (self.turn[0]..=self.turn[1]).contains(&lowest) {
             let square = beyond * beyond + quarter * quarter * (k * k);
             if square.re() == 0.0 {
@@ -145,19 +168,10 @@ impl Edge {
             return (nearest * s * 2.0 - squares * k) * side / (s * side + amplitude);
         }
         let at = |turn: f64| {
-            nearest * turn.cos() + quarter * turn.sin() + s * (2.0 * (0.5 * turn).sin().powi(2) / k)
+            nearest * turn.cos() + quarter * turn.sin() + s * (2.0 * (0.5 * turn).sin().powi(2)) / k
         };
         let [first, last] = self.turn.map(at);
         if first < last { first } else { last }
-    }
-
-    /// The same edge in other units: lengths times a factor.
-    pub fn scaled(&self, factor: f64) -> Self {
-        Self {
-            distance: self.distance * factor,
-            curvature: self.curvature / factor,
-            ..*self
-        }
     }
 }
 
@@ -166,21 +180,21 @@ pub const FURTHER: usize = BOUNDS - 2;
 
 /// The strips of one element: of half the width, in-plane curvature κ_g, and length.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Strips {
+pub struct Strips<W = f64> {
     /// Half the width, V/2.
-    pub half_width: f64,
+    pub half_width: W,
     /// In-plane curvature κ_g of the flat board.
     pub geodesic: f64,
     /// Length along the spine.
     pub length: f64,
     /// Edges of the board, besides those of the stretch, before which ribs must not cross either.
-    pub further: [Option<Edge>; FURTHER],
+    pub further: [Option<Edge<W>>; FURTHER],
 }
 
 /// An inner edge tighter than this, in V/2, counts as this tight: the true one is trimmed.
 const TIGHTEST: f64 = 0.9;
 
-impl Strips {
+impl<W: DualNum<Primitive = f64> + Copy> Strips<W> {
     /// The mean rib slope and the rib measure s = β' + κ_g (1+β²) there, which stands for the whole element.
     ///
     /// Source: Eq. (33), extended to curved belts
@@ -197,7 +211,7 @@ impl Strips {
     /// all the same, so that |s| ≤ 2/V holds everywhere.
     ///
     /// Source: Eq. (33)
-    pub fn slacks<D: DualNum<Primitive = f64> + Copy>(&self, slopes: [D; 2]) -> [D; BOUNDS] {
+    pub fn slacks<D: Scaled<W> + From<W>>(&self, slopes: [D; 2]) -> [D; BOUNDS] {
         let (mean, s) = self.measure(slopes);
         let w = self.half_width;
         let [minus, plus] = if self.geodesic == 0.0 {
@@ -207,7 +221,7 @@ impl Strips {
         } else {
             [self.ends(mean)[0], D::from(w)]
         };
-        let further = |edge: &Option<Edge>| match edge {
+        let further = |edge: &Option<Edge<W>>| match edge {
             None => D::one(),
             Some(edge) => edge.slack(mean, s),
         };
@@ -219,22 +233,26 @@ impl Strips {
     ///
     /// A rib so steep that it misses the inner edge of its own arc leaves the board farther along; there the root is
     /// continued smoothly.
-    pub fn ends<D: DualNum<Primitive = f64> + Copy>(&self, slope: D) -> [D; 2] {
+    pub fn ends<D: Scaled<W>>(&self, slope: D) -> [D; 2] {
         let w = self.half_width;
-        let geodesic = self.geodesic.clamp(-TIGHTEST / w, TIGHTEST / w);
+        let tightest = W::from(TIGHTEST) / w;
+        let geodesic = match self.geodesic.abs() < tightest.re() {
+            true => W::from(self.geodesic),
+            false => tightest * self.geodesic.signum(),
+        };
         let stretch = slope * slope + 1.0;
         [-w, w].map(|edge| {
-            let offset = edge - 0.5 * geodesic * w * w;
-            let root = continued_root(-stretch * (2.0 * geodesic * offset) + 1.0);
-            (root + 1.0).recip() * (2.0 * offset)
+            let offset = edge - geodesic * 0.5 * w * w;
+            let root = continued_root(-stretch * (geodesic * 2.0 * offset) + 1.0);
+            (root + 1.0).recip() * (offset * 2.0)
         })
     }
 
     /// What the width makes of the density's terms, by slopes at both ends of the element.
-    pub fn across<D: DualNum<Primitive = f64> + Copy>(&self, slopes: [D; 2]) -> Across<D> {
+    pub fn across<D: Scaled<W>>(&self, slopes: [D; 2]) -> Across<D> {
         let (mean, s) = self.measure(slopes);
         let [minus, plus] = self.ends(mean);
-        let length = (plus - minus) / (2.0 * self.half_width);
+        let length = (plus - minus) / (self.half_width * 2.0);
         let middle = -s * (plus + minus) * 0.5 + 1.0;
         let share = s * (plus - minus) * 0.5 / middle;
         Across {
@@ -243,7 +261,9 @@ impl Strips {
             area: length * middle,
         }
     }
+}
 
+impl Strips {
     /// Whether the slacks are linear in the slopes.
     pub fn has_linear_bounds(&self) -> bool {
         self.geodesic == 0.0 && self.further == [None; FURTHER]

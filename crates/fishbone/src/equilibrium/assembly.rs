@@ -17,7 +17,7 @@ pub(super) struct Assembly<'a> {
     belt: &'a Belt,
     units: Units,
     /// Where the programme has its origin, so that a belt far from the world's loses no digits: at the first support.
-    origin: Vector3<f64>,
+    pub(super) origin: Vector3<f64>,
 }
 
 impl<'a> Assembly<'a> {

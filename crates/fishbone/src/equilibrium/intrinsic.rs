@@ -4,7 +4,8 @@ use super::apart::keep_apart;
 use super::assembly::Assembly;
 use super::search::{Search, is_flat_under_load};
 use super::{
-    Equilibrium, LinkForce, Reaction, Status, Units, Wrench, excess_distance, is_taut, number,
+    Equilibrium, LinkForce, Reaction, Solved, Status, Units, Wrench, excess_distance, is_taut,
+    number,
 };
 use crate::belt::Belt;
 use crate::guess::{disturb, guess};
@@ -29,16 +30,16 @@ pub(super) fn solve(
 ) -> Equilibrium {
     let units = Units::of(belt);
     let assembly = Assembly::new(scenario, belt);
-    let (Found { program, solution }, status, message, doubts) = match excess_distance(scenario) {
+    let (Found { program, solution }, status, message, twice) = match excess_distance(scenario) {
         Some(message) => {
             let found = start(scenario, &assembly);
-            (found, Status::Infeasible, message, Vec::new())
+            (found, Status::Infeasible, message, None)
         }
         None => {
             let (found, crossing) = find(scenario, &assembly, proceed);
             let twice = said_twice(scenario, &found.program);
             let (status, message) = judge(scenario, &found.solution, crossing, twice.as_deref());
-            (found, status, message, doubts(status, twice))
+            (found, status, message, twice)
         }
     };
     let stable = stable(status, solution.curvature);
@@ -49,12 +50,13 @@ pub(super) fn solve(
     };
     let internal = program.internal(&solution.point, &solution.multipliers);
     let links = program.link_forces(&solution.multipliers).into_iter();
+    let is_flat = is_flat_under_load(&program, &solution.point);
     Equilibrium {
         status,
         message,
         warnings: [
-            warnings(scenario, &program, &solution.point, status, stable),
-            doubts,
+            warnings(scenario, &program, status, stable, is_flat),
+            doubts(status, twice.as_deref()),
             passed_through_itself(scenario, half_turns),
         ]
         .concat(),
@@ -75,6 +77,17 @@ pub(super) fn solve(
         residuals: solution.residuals,
         iterations: solution.iterations,
         scenario: scenario.clone(),
+        solved: Some(Solved {
+            program,
+            point: solution.point,
+            multipliers: solution.multipliers,
+            bound_multipliers: solution.bound_multipliers,
+            curvature: solution.curvature,
+            units,
+            origin: assembly.origin,
+            said_twice: twice,
+            is_flat,
+        }),
     }
 }
 
@@ -212,7 +225,7 @@ fn judge(
 }
 
 /// What should be known of constraints that depend on each other before the reactions are relied on.
-fn doubts(status: Status, said_twice: Option<String>) -> Vec<String> {
+fn doubts(status: Status, said_twice: Option<&str>) -> Vec<String> {
     let names = said_twice.filter(|_| status == Status::Converged);
     let said = names.map(|names| {
         format!("{names} hold the same twice over: what each of them bears is not determined")
@@ -233,9 +246,9 @@ fn passed_through_itself(scenario: &Scenario, half_turns: Option<i32>) -> Vec<St
 fn warnings(
     scenario: &Scenario,
     program: &BeltProgram,
-    point: &BeltPoint,
     status: Status,
     stable: Option<bool>,
+    is_flat: bool,
 ) -> Vec<String> {
     // Strong twist makes facets of the scale of V, which longer elements cannot resolve.
     const SAFE: f64 = 8.0;
@@ -246,7 +259,7 @@ fn warnings(
     let longest = shares.fold(0.0, f64::max);
     let coarse = longest * SAFE > 1.0 + 1e-9;
     let taut = status != Status::Infeasible && is_taut(scenario);
-    let flat = status == Status::Converged && is_flat_under_load(program, point);
+    let flat = status == Status::Converged && is_flat;
     let weightless = scenario.loads.gravity.is_some_and(|g| g != [0.0; 3])
         && scenario.belt.density_value() == 0.0;
     let thick = scenario.belt.thickness();

@@ -103,6 +103,7 @@ fn report(scenario: &Scenario, belt: &Belt, start: &Pose, solution: &Solution) -
             complementarity: 0.0,
         },
         iterations: solution.iterations,
+        solved: None,
     }
 }
 

@@ -40,7 +40,7 @@ impl DeadForce {
 
 /// The weight of a piece of the belt as dead forces at its two ends, half of it each, with levers along the spine: the
 /// integral of the position by Hermite's rule, h/2 (x₀ + x₁) + h²/12 (η₀ − η₁).
-pub(super) fn weight(per_length: &Vector3<f64>, length: f64) -> [DeadForce; 2] {
+pub(crate) fn weight(per_length: &Vector3<f64>, length: f64) -> [DeadForce; 2] {
     [1.0, -1.0].map(|sign| DeadForce {
         force: 0.5 * length * per_length,
         lever: Vector3::y() * (sign * length / 6.0),

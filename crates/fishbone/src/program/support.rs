@@ -208,11 +208,35 @@ impl Gap {
     }
 }
 
+/// How a support's conditions on a frame answer to turns of it, left and in world axes.
+///
+/// They depend on how the frame is turned from the prescribed one and on nothing else.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Turn {
+    /// Derivative of the conditions.
+    pub(crate) jacobian: Matrix3<f64>,
+    /// Derivative of multipliers times conditions.
+    pub(crate) pull: Vector3<f64>,
+    /// Its second derivative along single turns.
+    pub(crate) hessian: Matrix3<f64>,
+}
+
 impl NodeSupport {
     /// The prescribed position, where all of it is.
     pub fn point(&self) -> Option<Vector3<f64>> {
         let [x, y, z] = self.position;
         Some(Vector3::new(x?, y?, z?))
+    }
+
+    /// The components of a vector along which the position is held.
+    pub(crate) fn held(&self, vector: &Vector3<f64>) -> Vector3<f64> {
+        Vector3::from_fn(|i, _| {
+            if self.position[i].is_some() {
+                vector[i]
+            } else {
+                0.0
+            }
+        })
     }
 
     fn gap(&self, pose: &Pose) -> Gap {
@@ -225,7 +249,7 @@ impl NodeSupport {
 
     pub(super) fn value(&self, pose: &Pose) -> Rows {
         let mut rows = Rows::zeros();
-        for (i, held) in self.held() {
+        for (i, held) in self.components() {
             rows[i] = pose.position[i] - held;
         }
         rows.fixed_rows_mut::<3>(3)
@@ -237,7 +261,7 @@ impl NodeSupport {
     pub(super) fn jacobian(&self, pose: &Pose) -> RowsByNode {
         let mut rows = RowsByNode::zeros();
         let by_turn = -hat(&pose.position);
-        for (i, _) in self.held() {
+        for (i, _) in self.components() {
             rows[(i, i)] = 1.0;
             rows.fixed_view_mut::<1, 3>(i, 3)
                 .copy_from(&by_turn.fixed_rows::<1>(i));
@@ -249,10 +273,7 @@ impl NodeSupport {
 
     /// Second derivative of `multipliers · value` by the node's unknowns.
     pub(super) fn hessian(&self, pose: &Pose, multipliers: &Rows) -> NodeMatrix {
-        let mut force = Vector3::zeros();
-        for (i, _) in self.held() {
-            force[i] = multipliers[i];
-        }
+        let force = self.held(&multipliers.fixed_rows::<3>(0).into());
         let mut hessian = NodeMatrix::zeros();
         hessian
             .fixed_view_mut::<6, 6>(0, 0)
@@ -265,9 +286,21 @@ impl NodeSupport {
     }
 
     /// The components of the position that are prescribed.
-    fn held(&self) -> impl Iterator<Item = (usize, f64)> {
+    fn components(&self) -> impl Iterator<Item = (usize, f64)> {
         let components = self.position.into_iter().enumerate();
         components.filter_map(|(i, held)| Some((i, held?)))
+    }
+
+    /// How the frame's conditions answer to turns.
+    pub(crate) fn turn(&self, pose: &Pose, multipliers: &Rows) -> Turn {
+        let gap = self.gap(pose);
+        let weights = multipliers.fixed_rows::<3>(3).into_owned();
+        let jacobian = gap.jacobian() * pose.frame.transpose();
+        Turn {
+            jacobian,
+            pull: jacobian.tr_mul(&weights),
+            hessian: pose.frame * gap.hessian(&weights) * pose.frame.transpose(),
+        }
     }
 
     /// Force and moment of the support on the belt about its point, world axes.

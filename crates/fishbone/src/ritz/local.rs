@@ -53,7 +53,7 @@ pub(super) fn euler<D: Scalar>(q: &Local<D>) -> [D; 3] {
 /// Source: Eq. (29), (34)
 pub(super) fn density<D: Scalar>(energy: EnergyModel, width: f64, q: &Local<D>) -> D {
     let across = Across::straight(q[7] * (0.5 * width));
-    energy.value(rates(q)[2], q[6], &Curl::default(), &across)
+    energy.value(rates(q)[2], q[6], &Curl::<f64>::default(), &across)
 }
 
 /// The three equations that hold where the orientation is the one prescribed.

@@ -155,6 +155,7 @@ impl<'a, P: Program> State<'a, P> {
             point: self.point,
             values: self.values,
             multipliers: self.multipliers,
+            bound_multipliers: self.bound_multipliers,
             iterations: self.iteration,
             outcome,
             curvature,

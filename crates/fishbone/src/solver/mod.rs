@@ -9,10 +9,12 @@ mod border;
 pub mod chain;
 mod filter;
 mod interior_point;
+mod kkt;
 mod newton;
 mod rank;
 
 pub use interior_point::minimise;
+pub use kkt::{Kkt, KktVector, Singular};
 pub use rank::dependent_constraints;
 
 use chain::{Chain, Diagonal, NodeMatrix, NodeTerm, NodeVector, Stage};
@@ -168,6 +170,8 @@ pub struct Solution<P> {
     pub values: Values,
     /// Multipliers of the constraints, in the order of their values.
     pub multipliers: Vec<Rows>,
+    /// Multipliers of the inequalities.
+    pub bound_multipliers: Bounds,
     /// Residuals there.
     pub residuals: Residuals,
     /// Iterations taken.

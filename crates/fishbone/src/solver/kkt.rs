@@ -1,0 +1,222 @@
+//! The first-order conditions of a solution, linearised and factorised: how it answers to small changes of its programme.
+
+use super::chain::NodeVector;
+use super::newton::Newton;
+use super::{BOUNDS, Bounds, Linearisation, Program, Rows, Values, add_controls, larger};
+use nalgebra::{SVector, Vector2, Vector4};
+
+/// Most times that the solution of the system is improved by what it misses.
+const REFINEMENTS: usize = 20;
+/// Share of the solution below which an improvement is the last.
+const ENOUGH: f64 = 1e-12;
+/// Share of the right-hand side below which what answers to it is rounding.
+const NOTHING: f64 = 1e-8;
+/// Share of the solution above which what is missed is more than rounding.
+const CLEARLY: f64 = 1e-6;
+
+/// The symmetric system
+///
+/// ```text
+/// [ H  Jᵀ  Sᵀ  ] [ step ]       [ gradient    ]
+/// [ J          ] [  λ   ]  =  − [ constraints ]
+/// [ S     −s/ν ] [  κ   ]       [ slacks      ]
+/// ```
+///
+/// at a solution: H the second derivative of the Lagrangian, J and S the first ones of constraints and slacks. With the
+/// change of these and of the Lagrangian's gradient on the right, it yields the step of the unknowns, that of the
+/// constraints' multipliers, and that of the bounds' with the sign changed, in which slack times multiplier is kept.
+#[derive(Debug, Clone)]
+pub struct Kkt {
+    linear: Linearisation,
+    newton: Newton,
+    pairs: Vec<[usize; 2]>,
+    /// Multiplier over slack of every bound in use; 0 of the others.
+    stiffness: Bounds,
+}
+
+/// A vector of the system: its right-hand side, or its solution.
+#[derive(Debug, Clone)]
+pub struct KktVector {
+    /// Entries of the unknowns; of a right-hand side they are derivatives by all states and controls, of a solution the
+    /// states are carried along.
+    pub nodes: Vec<NodeVector>,
+    /// Entries of the constraints.
+    pub constraints: Vec<Rows>,
+    /// Entries of the bounds.
+    pub bounds: Bounds,
+}
+
+/// The system has no solution, or not a single one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Singular;
+
+impl Kkt {
+    /// Factorises the system of a programme at its minimum.
+    ///
+    /// Errors: [`Singular`] where the second variation is not positive.
+    pub fn factorise<P: Program>(
+        program: &P,
+        point: &mut P::Point,
+        multipliers: &[Rows],
+        bounds: &Bounds,
+    ) -> Result<Self, Singular> {
+        let mut values = Values::default();
+        if !program.evaluate(point, &mut values) {
+            return Err(Singular);
+        }
+        let mut linear = Linearisation::new(program);
+        program.linearise(point, multipliers, bounds, &mut linear);
+        let (pairs, used) = (program.linked_nodes(), program.bounds());
+        let mut newton = Newton::new(&linear, pairs.clone(), &program.weights(), used);
+        newton.assemble(&linear, &values, bounds);
+        newton
+            .factorise_damped(&linear, 0.0)
+            .map_err(|_| Singular)?;
+        let mut stiffness = vec![[0.0; BOUNDS]; bounds.len()];
+        for (k, stiffness) in stiffness.iter_mut().enumerate() {
+            for (b, stiffness) in stiffness.iter_mut().enumerate().take(used) {
+                *stiffness = bounds[k][b] / values.slacks[k][b];
+            }
+        }
+        Ok(Self {
+            linear,
+            newton,
+            pairs,
+            stiffness,
+        })
+    }
+
+    /// A vector of zeros.
+    pub fn zero(&self) -> KktVector {
+        KktVector {
+            nodes: vec![NodeVector::zeros(); self.linear.gradient.len()],
+            constraints: vec![Rows::zeros(); self.linear.constraints.len() + self.pairs.len()],
+            bounds: vec![[0.0; BOUNDS]; self.stiffness.len()],
+        }
+    }
+
+    /// Solves the system.
+    ///
+    /// The bounds are eliminated for the factorisation, and where one is active that drowns its multiplier in rounding.
+    /// What is missed is counted with the multipliers themselves, so that it does not come back.
+    ///
+    /// Errors: [`Singular`] where the constraints cannot change as asked.
+    pub fn solve(&mut self, right: &KktVector) -> Result<KktVector, Singular> {
+        let mut found = self.zero();
+        self.pull_by_stiffness(right, &mut found.bounds);
+        let mut missed = self.missed(right, &found);
+        let mut last = f64::INFINITY;
+        let least = NOTHING * largest(&right.nodes).max(largest(&right.constraints));
+        let size = |vectors: &[NodeVector]| largest(vectors).max(least).max(f64::MIN_POSITIVE);
+        for _ in 0..=REFINEMENTS {
+            self.newton
+                .solve(&self.linear, &missed.nodes, &missed.constraints);
+            self.add_step(&mut found);
+            missed = self.missed(right, &found);
+            let share = largest(&self.newton.step) / size(&found.nodes);
+            let no_better = share >= last;
+            last = share;
+            if share <= ENOUGH || no_better {
+                break;
+            }
+        }
+        let moved = size(&found.nodes).max(largest(&right.constraints));
+        let is_met = largest(&missed.constraints) <= CLEARLY * moved;
+        match last <= CLEARLY && is_met {
+            true => Ok(found),
+            false => Err(Singular),
+        }
+    }
+
+    /// What the changes of the slacks alone do to the bounds' multipliers.
+    fn pull_by_stiffness(&self, right: &KktVector, into: &mut Bounds) {
+        for (k, pulls) in into.iter_mut().enumerate() {
+            for (b, pull) in pulls.iter_mut().enumerate() {
+                *pull = self.stiffness[k][b] * right.bounds[k][b];
+            }
+        }
+    }
+
+    /// Adds the step that was solved for last.
+    fn add_step(&self, to: &mut KktVector) {
+        for (node, step) in to.nodes.iter_mut().zip(&self.newton.step) {
+            *node += step;
+        }
+        let steps = &self.newton.multiplier_step;
+        for (rows, step) in to.constraints.iter_mut().zip(steps) {
+            *rows += step;
+        }
+        for (k, bounds) in to.bounds.iter_mut().enumerate() {
+            for (b, bound) in bounds.iter_mut().enumerate() {
+                if self.stiffness[k][b] != 0.0 {
+                    let rate = self.newton.slack_rate(&self.linear, k, b);
+                    *bound += self.stiffness[k][b] * rate;
+                }
+            }
+        }
+    }
+
+    /// Left-hand side of the first two rows plus the right-hand side: nothing at the solution.
+    fn missed(&self, right: &KktVector, at: &KktVector) -> KktVector {
+        let mut missed = right.clone();
+        self.add_second_derivatives(&at.nodes, &mut missed.nodes);
+        for (k, bounds) in at.bounds.iter().enumerate() {
+            for (b, bound) in bounds.iter().enumerate() {
+                if *bound != 0.0 {
+                    let pull = *bound * self.linear.slacks[k][b];
+                    add_controls(&mut missed.nodes, k, &pull);
+                }
+            }
+        }
+        let (at_nodes, between) = missed
+            .constraints
+            .split_at_mut(self.linear.constraints.len());
+        let (pulls, link_pulls) = at.constraints.split_at(at_nodes.len());
+        let terms = self
+            .linear
+            .diagonal
+            .nodes
+            .iter()
+            .zip(&self.linear.constraints);
+        for (i, (term, rows)) in terms.enumerate() {
+            at_nodes[i] += rows * at.nodes[term.node];
+            missed.nodes[term.node] += rows.tr_mul(&pulls[i]) + term.hessian * at.nodes[term.node];
+        }
+        for (i, (pair, by_nodes)) in self.pairs.iter().zip(&self.linear.links).enumerate() {
+            for (node, rows) in pair.iter().zip(by_nodes) {
+                between[i] += rows * at.nodes[*node];
+                missed.nodes[*node] += rows.tr_mul(&link_pulls[i]);
+            }
+        }
+        missed
+    }
+
+    /// Adds the second derivatives of stages and states along a step.
+    fn add_second_derivatives(&self, step: &[NodeVector], into: &mut [NodeVector]) {
+        let Linearisation {
+            chain, diagonal, ..
+        } = &self.linear;
+        for (k, (stage, own)) in chain.stages.iter().zip(&diagonal.controls).enumerate() {
+            let [first, second]: [Vector2<f64>; 2] =
+                [k, k + 1].map(|node| step[node].fixed_rows::<2>(6).into_owned());
+            into[k] += stage.state_first * first + stage.state_second * second;
+            let controls = Vector4::new(first[0], first[1], second[0], second[1]);
+            let mut by_controls = own * controls;
+            let mut by_first = by_controls.fixed_rows_mut::<2>(0);
+            by_first += stage.state_first.tr_mul(&step[k]);
+            let mut by_second = by_controls.fixed_rows_mut::<2>(2);
+            by_second += stage.state_second.tr_mul(&step[k]);
+            add_controls(into, k, &by_controls);
+        }
+        for (k, own) in chain.states.iter().enumerate() {
+            let mut by_state = into[k].fixed_rows_mut::<6>(0);
+            by_state += own * step[k].fixed_rows::<6>(0);
+        }
+    }
+}
+
+/// Largest absolute entry; NaN where one is.
+fn largest<const N: usize>(vectors: &[SVector<f64, N>]) -> f64 {
+    let amax = vectors.iter().map(SVector::amax);
+    amax.fold(0.0, larger)
+}

@@ -1,0 +1,164 @@
+"""Derivatives of an equilibrium by what it was solved for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fishbone.errors import InvalidArgument, NoSensitivity
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+    from numpy.typing import NDArray
+
+    from fishbone import _core
+
+    Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Change:
+    """How an equilibrium changes along a direction of its parameters; n is the number of nodes, m of supports.
+
+    Units: those of the scenario; angles in rad.
+    """
+
+    position: Floats
+    """Displacement of the spine at the nodes, shape (n, 3)."""
+    rotation: Floats
+    """Rotation of the frame at the nodes, left and in world axes, shape (n, 3)."""
+    bend: Floats
+    """Change of the bend ω_ζ at the nodes, shape (n,)."""
+    rib_slope: Floats
+    """Change of the rib slope β at the nodes, shape (n,)."""
+    reactions: Floats
+    """Change of [force, moment] of the supports, shape (m, 6)."""
+    energy: float
+    """Change of the total potential."""
+
+
+@dataclass(frozen=True, eq=False)
+class Gradient:
+    """Derivative of a number by the parameters of an equilibrium; n is the number of nodes, m of supports.
+
+    Units: those of the number over those of the scenario; angles in rad.
+    """
+
+    supports: Floats
+    """By [translation, left world-axes rotation about the support point] of the supports, shape (m, 6)."""
+    rigidity: Floats
+    """By the rigidity R_f at the nodes, linear in between, shape (n,)."""
+    natural_bend: Floats
+    """By the natural bend of every segment of the belt, shape (segments,)."""
+    width: float
+    """By the width; rigidity and mass of the whole width stay what they are."""
+    gravity: Floats
+    """By gravity, shape (3,)."""
+
+
+class Sensitivity:
+    """The first-order conditions of an equilibrium, linearised and factorised.
+
+    A product costs little beside a solve. The derivatives are those of the discrete equations, on the mesh of the
+    equilibrium, to the accuracy of their solution; they hold as long as the ribs that touch stay the same. The
+    natural bend of segments that go on without a joint changes without one.
+    """
+
+    __slots__ = ("_inner",)
+
+    def __init__(self, inner: _core.Sensitivity) -> None:
+        self._inner = inner
+
+    def forward(
+        self,
+        supports: npt.ArrayLike | None = None,
+        rigidity: npt.ArrayLike | None = None,
+        natural_bend: npt.ArrayLike | None = None,
+        width: float = 0.0,
+        gravity: npt.ArrayLike | None = None,
+    ) -> Change:
+        """The change of the equilibrium along a direction of its parameters.
+
+        `supports` holds [translation, left world-axes rotation about the support point] of every support; components
+        that are free change nothing. `rigidity` is the change of R_f at the nodes, linear in between. The width changes
+        alone: for a belt given by its material go with it rigidity and mass, `rigidity = R_f/V` and `gravity = g/V`.
+
+        Shapes: supports (m, 6), rigidity (n,), natural_bend (segments,), gravity (3,); None is no change.
+        Errors: `InvalidArgument` for other shapes and what is not finite; `NoSensitivity` where the supports leave the
+        belt no slack to follow.
+        """
+        m, n, segments = self._inner.shape
+        arguments = (
+            _array("supports", supports, (m, 6)),
+            _array("rigidity", rigidity, (n,)),
+            _array("natural_bend", natural_bend, (segments,)),
+            float(_array("width", width, ())),
+            _array("gravity", gravity, (3,)).tolist(),
+        )
+        try:
+            return Change(*self._inner.forward(*arguments))
+        except ValueError as error:
+            raise NoSensitivity(str(error)) from None
+
+    def adjoint(  # noqa: PLR0913, PLR0917
+        self,
+        position: npt.ArrayLike | None = None,
+        rotation: npt.ArrayLike | None = None,
+        bend: npt.ArrayLike | None = None,
+        rib_slope: npt.ArrayLike | None = None,
+        reactions: npt.ArrayLike | None = None,
+        energy: float = 0.0,
+    ) -> Gradient:
+        """The derivative by the parameters of a number whose derivatives by the equilibrium are these.
+
+        It is the transpose of `forward`: the gradient of an objective by all parameters at the cost of one product.
+
+        Shapes: those of `Change`; None is no dependence.
+        Errors: `InvalidArgument` for other shapes and what is not finite; `NoSensitivity` where the supports leave the
+        belt no slack to follow.
+        """
+        m, n, _ = self._inner.shape
+        arguments = (
+            _array("position", position, (n, 3)),
+            _array("rotation", rotation, (n, 3)),
+            _array("bend", bend, (n,)),
+            _array("rib_slope", rib_slope, (n,)),
+            _array("reactions", reactions, (m, 6)),
+            float(_array("energy", energy, ())),
+        )
+        try:
+            supports, rigidity, natural_bend, width, gravity = self._inner.adjoint(*arguments)
+        except ValueError as error:
+            raise NoSensitivity(str(error)) from None
+        return Gradient(supports, rigidity, natural_bend, width, np.array(gravity))
+
+    def jacobian(self, support: int) -> Floats:
+        """Spine positions by [translation, left world-axes rotation about the support point] of a support by its index.
+
+        Shapes: (n, 3, 6).
+        Errors: `InvalidArgument` where there is no such support; `NoSensitivity` where the supports leave the belt no
+        slack to follow.
+        """
+        count, _, _ = self._inner.shape
+        if not 0 <= support < count:
+            raise InvalidArgument(f"support: found {support}, allowed 0 to {count - 1}")
+        try:
+            return self._inner.jacobian(support)
+        except ValueError as error:
+            raise NoSensitivity(str(error)) from None
+
+
+def _array(name: str, value: npt.ArrayLike | None, shape: tuple[int, ...]) -> Floats:
+    if value is None:
+        return np.zeros(shape)
+    try:
+        array = np.array(value, dtype=np.float64, order="C")
+    except (TypeError, ValueError):
+        raise InvalidArgument(f"{name}: found {type(value).__name__}, allowed numbers of shape {shape}") from None
+    if array.shape != shape:
+        raise InvalidArgument(f"{name}: found an array of shape {array.shape}, allowed {shape}")
+    if not np.all(np.isfinite(array)):
+        raise InvalidArgument(f"{name}: found a number that is not finite")
+    return array
