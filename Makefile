@@ -1,8 +1,10 @@
 # make demo    solves example 1: the table here, out/example1.json and out/example1.png
 # make test    everything that must hold
 # make figures draws the pictures of README.md and docs
+# make bench   measures how fast it is beside what one would use instead, and writes docs/performance.md
 # make clean   removes what these made
 #
+# `make bench BENCH="--only cold --dry-run"` measures a part and saves nothing.
 # Needs cargo, Python 3.10 or newer and make; everything else goes into .venv.
 
 PYTHON ?= python3
@@ -18,7 +20,7 @@ RUST_SOURCES := Cargo.toml Cargo.lock $(shell find crates scenarios -type f)
 PYTHON_SOURCES := pyproject.toml $(shell find python tests benchmarks docs -name '*.py' -o -name '*.pyi')
 TEXTS := $(shell find README.md docs scenarios tests -type f -not -name '*.pyc' 2>/dev/null)
 
-.PHONY: help demo test figures clean
+.PHONY: help demo test figures bench clean
 .DELETE_ON_ERROR:
 
 help:
@@ -34,6 +36,14 @@ test: $(VENV)/.rust $(VENV)/.lint $(VENV)/.pytest
 
 figures: $(CORE)
 	@PYTHONPATH=benchmarks $(BIN)/python docs/make_figures.py
+
+# On one thread, so that the clock is that of the work: threads of BLAS only wait on matrices as small as these.
+bench: $(VENV)/.bench
+	@PYTHONPATH=benchmarks OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m speed $(BENCH)
+
+$(VENV)/.bench: $(CORE) benchmarks/requirements.txt
+	@$(PIP) install --requirement benchmarks/requirements.txt
+	@touch $@
 
 clean:
 	@rm -rf $(VENV) out dist $(CORE)

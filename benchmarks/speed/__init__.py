@@ -1,0 +1,1 @@
+"""How fast fishbone is beside what one would use instead of it: `make bench`."""

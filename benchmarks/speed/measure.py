@@ -1,0 +1,239 @@
+"""What is measured. Every section is a list of plain records, or one, as they stand in results/speed.json."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from rich.console import Console
+from rich.progress import track
+
+import random_poses
+from cases import curve, shell
+from speed.problem import EXAMPLES, Answer, Pose, end_pose, path
+from speed.rivals import ENTRIES, OURS, Entry
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator, Sequence
+
+    from speed.problem import Energy, Rival
+
+    Record = dict[str, Any]
+
+COLD_ELEMENTS, WARM_ELEMENTS = 80, 64
+REPETITIONS = (3, 201)
+"""Fewest and most solves of a case."""
+SECONDS = 4.0
+"""A case is solved again until this much time has passed."""
+RANDOM_POSES = 40
+PATIENCE = 60.0
+"""A rival solves random poses for so many seconds at most."""
+PATH = 10_000
+"""Poses of the path; a rival of fewer updates does stretches of it, in the same steps."""
+STRETCH = 20
+MESHES = (100, 1000, 10_000)
+BATCH = 10_000
+ENERGY: Energy = "fishbone"
+"""Of the examples, and so of the warm updates."""
+RANDOM_ENERGY: Energy = "wunderlich"
+SAME = 1e-6
+"""Relative difference of energies up to which two shapes count as the same."""
+
+
+def _progress(items: Sequence[Any], title: str) -> Iterable[Any]:
+    return track(items, title, console=Console(stderr=True), transient=True)
+
+
+def percentiles(seconds: Sequence[float], *percents: float) -> list[float]:
+    """Percentiles in seconds."""
+    return [float(value) for value in np.percentile(seconds, percents)]
+
+
+# ------------------------------------------------------------------------------------------------------------- cold
+
+
+def cold() -> list[Record]:
+    """Both examples from each rival's own guess."""
+    cases = [(entry, energy) for entry in ENTRIES for energy in entry.energies]
+    records = []
+    for entry, energy in _progress(cases, "cold"):
+        rival = entry.build(energy, COLD_ELEMENTS)
+        records += [_cold(entry, energy, rival, example) for example in EXAMPLES]
+    return records
+
+
+def _cold(entry: Entry, energy: Energy, rival: Rival, example: str) -> Record:
+    pose = end_pose(example)
+    answers = _repeated(lambda: rival.cold(pose))
+    seconds = [answer.seconds for answer in answers]
+    first = answers[0]
+    return {
+        "rival": entry.name,
+        "energy_model": energy,
+        "example": example,
+        "converged": first.converged,
+        "energy": first.energy,
+        "iterations": first.iterations,
+        "repetitions": len(answers),
+        "p50": percentiles(seconds, 50)[0],
+        "min": min(seconds),
+        "distance": distance(rival, example),
+    }
+
+
+def _repeated(solve: Callable[[], Answer]) -> list[Answer]:
+    fewest, most = REPETITIONS
+    answers: list[Answer] = []
+    start = perf_counter()
+    while len(answers) < fewest or (len(answers) < most and perf_counter() - start < SECONDS):
+        answers.append(solve())
+    return answers
+
+
+def distance(rival: Rival, example: str) -> float:
+    """RMS distance of the rival's last centre line from the shell's."""
+    data = shell(example)
+    position, tangent = rival.curve()
+    line = curve(np.linspace(0.0, data["length"], len(position)), position, tangent)
+    return float(np.sqrt(np.mean(np.sum((line(data["u"]) - data["position"]) ** 2, axis=1))))
+
+
+# ----------------------------------------------------------------------------------------------------- random poses
+
+
+def random() -> list[Record]:
+    """Random poses, of which each rival solves as many as its time allows; its shapes are compared with fishbone's."""
+    rng = np.random.default_rng(1)
+    poses = [Pose(*random_poses.pose(rng)) for _ in range(RANDOM_POSES)]
+    energies: list[float] = []
+    records = []
+    for entry in _progress([entry for entry in ENTRIES if entry.solves_random], "random poses"):
+        rival = entry.build(RANDOM_ENERGY, COLD_ELEMENTS)
+        answers = list(_patiently(rival, poses))
+        if entry.name == OURS:
+            energies = [answer.energy for answer in answers]
+        records.append(
+            {
+                "rival": entry.name,
+                "poses": len(answers),
+                "converged": sum(answer.converged for answer in answers),
+                "shapes": None if entry.is_other_model else _compared(answers, energies),
+                "p50": percentiles([answer.seconds for answer in answers], 50)[0],
+            }
+        )
+    return records
+
+
+def _compared(answers: Sequence[Answer], energies: Sequence[float]) -> dict[str, int]:
+    """How many of the converged shapes are fishbone's, how many are of less energy, how many of more."""
+    pairs = zip(answers, energies, strict=False)
+    apart = np.array([answer.energy / energy - 1.0 for answer, energy in pairs if answer.converged])
+    lower, higher = int(np.sum(apart < -SAME)), int(np.sum(apart > SAME))
+    return {"same": len(apart) - lower - higher, "lower": lower, "higher": higher}
+
+
+def _patiently(rival: Rival, poses: Sequence[Pose]) -> Iterator[Answer]:
+    start = perf_counter()
+    for pose in poses:
+        if perf_counter() - start > PATIENCE:
+            return
+        yield rival.cold(pose)
+
+
+# ------------------------------------------------------------------------------------------------------------- warm
+
+
+def warm() -> list[Record]:
+    """Updates along the path, each from the shape before."""
+    cases = [(entry, example) for entry in ENTRIES if entry.updates for example in EXAMPLES]
+    return [_warm(entry, example) for entry, example in _progress(cases, "warm")]
+
+
+def _warm(entry: Entry, example: str) -> Record:
+    rival = entry.build(ENERGY, WARM_ELEMENTS)
+    poses = list(path(example, PATH + 1))
+    answers: list[Answer] = []
+    for stretch in stretches(PATH, entry.updates):
+        rival.cold(poses[stretch.start])
+        for at in stretch[1:]:
+            answers.append(rival.warm(poses[at]))
+            if not answers[-1].converged:
+                rival.cold(poses[at])
+    seconds = [answer.seconds for answer in answers]
+    half, most, nearly_all = percentiles(seconds, 50, 99, 99.9)
+    return {
+        "rival": entry.name,
+        "example": example,
+        "updates": len(answers),
+        "failures": sum(not answer.converged for answer in answers),
+        "iterations": float(np.mean([answer.iterations for answer in answers])),
+        "p50": half,
+        "p99": most,
+        "p99.9": nearly_all,
+    }
+
+
+def stretches(count: int, updates: int) -> list[range]:
+    """So many updates on a path of `count`: all of it, or stretches at equal distances, each with its start."""
+    if updates >= count:
+        return [range(count + 1)]
+    parts = max(1, updates // STRETCH)
+    return [range(part * count // parts, part * count // parts + updates // parts + 1) for part in range(parts)]
+
+
+# ------------------------------------------------------------------------------- meshes, batches and instructions
+
+
+def scaling() -> list[Record]:
+    """Time of an iteration and memory of fishbone by mesh, each in a process of its own."""
+    return [_in_process("mesh", str(elements)) for elements in _progress(MESHES, "meshes")]
+
+
+def batch() -> list[Record]:
+    """`solve_many` on random poses, on one thread and on two."""
+    return [_in_process("batch", str(BATCH), RAYON_NUM_THREADS=str(threads)) for threads in _progress((1, 2), "batch")]
+
+
+def _in_process(*arguments: str, **environment: str) -> Record:
+    command = [sys.executable, "-m", "speed.process", *arguments]
+    told = subprocess.run(command, check=True, capture_output=True, text=True, env=os.environ | environment)
+    record: Record = json.loads(told.stdout)
+    return record
+
+
+def instructions() -> list[Record]:
+    """Instructions of one cold solve, by callgrind: of a process that solves twice less one that solves once."""
+    valgrind = shutil.which("valgrind")
+    if valgrind is None:
+        return []
+    records = []
+    for example in _progress(EXAMPLES, "instructions"):
+        once, twice = (_counted(valgrind, example, solves) for solves in (1, 2))
+        records.append({"example": example, "instructions": twice - once})
+    return records
+
+
+def _counted(valgrind: str, example: str, solves: int) -> int:
+    command = [valgrind, "--tool=callgrind", "--callgrind-out-file=/dev/null"]
+    command += [sys.executable, "-m", "speed.process", "solve", example, str(solves)]
+    told = subprocess.run(command, check=True, capture_output=True, text=True)
+    found = re.search(r"Collected : (\d+)", told.stderr)
+    assert found is not None
+    return int(found[1])
+
+
+SECTIONS: dict[str, Callable[[], list[Record]]] = {
+    "cold": cold,
+    "random": random,
+    "warm": warm,
+    "scaling": scaling,
+    "batch": batch,
+    "instructions": instructions,
+}
