@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import fishbone as fb
 from speed.problem import Answer, Energy, Pose, scenario
@@ -23,13 +23,13 @@ class Intrinsic:
         """One `fb.solve`, and a tracker for what comes next."""
         given = scenario(self.energy, self.elements, pose)
         seconds, self.belt = timed(fb.solve, given)
-        self.tracker: Any = None
+        self.tracker: fb.Tracker | None = None
         return Answer(self.belt.status == "converged", seconds, self.belt.iterations, self.belt.energy)
 
     def warm(self, pose: Pose) -> Answer:
         """One update of the tracker."""
         if self.tracker is None:
-            self.tracker = fb.Tracker(self.belt.scenario)  # type: ignore[operator]
+            self.tracker = fb.Tracker(self.belt.scenario)
         seconds, update = timed(self.tracker.update, pose.position, pose.rotation)
         return Answer(update.status == "converged", seconds, update.iterations, update.energy)
 

@@ -31,9 +31,11 @@ from fishbone.errors import (
     NoSensitivity,
     NoSupport,
     NotConverged,
+    NoTracker,
 )
 from fishbone.scenario import Scenario, load
 from fishbone.sensitivity import Change, Gradient, Sensitivity
+from fishbone.tracker import Tracker, Update
 
 __all__ = [
     "BendRadius",
@@ -49,6 +51,7 @@ __all__ = [
     "MissingPackage",
     "NoSensitivity",
     "NoSupport",
+    "NoTracker",
     "NotConverged",
     "Outline",
     "Reaction",
@@ -57,6 +60,8 @@ __all__ = [
     "Scenario",
     "Sensitivity",
     "SpineRadius",
+    "Tracker",
+    "Update",
     "__version__",
     "load",
     "solve",

@@ -28,6 +28,10 @@ class NoSensitivity(FishboneError):  # noqa: N818
     """A shape has no derivatives: it is no equilibrium, no minimum, or not determined by its supports."""
 
 
+class NoTracker(FishboneError):  # noqa: N818
+    """There is no equilibrium to follow, or nothing to move it by."""
+
+
 class MissingPackage(FishboneError, ImportError):  # noqa: N818
     """An optional package is not installed; the message says how to get it."""
 

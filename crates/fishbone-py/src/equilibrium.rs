@@ -3,6 +3,7 @@
 use crate::array::{self, Grid, Points, Scalars, Triangles};
 use crate::scenario::Scenario;
 use crate::sensitivity::{Sensitivity, refused};
+use crate::tracker::Tracker;
 use fishbone::equilibrium::{self, Status, Wrench};
 use fishbone::spine::Piece;
 use fishbone::surface::{self, Curve, Rib};
@@ -28,14 +29,33 @@ pub(crate) fn solve(py: Python<'_>, scenario: &Scenario) -> PyResult<Equilibrium
     }
 }
 
+/// The name of a status in results.
+pub(crate) fn status_name(status: Status) -> &'static str {
+    match status {
+        Status::Converged => "converged",
+        Status::Infeasible => "infeasible",
+        Status::NotConverged => "not_converged",
+    }
+}
+
 impl Equilibrium {
     /// Solves and takes the time.
     pub(crate) fn timed(
         scenario: &fishbone::scenario::Scenario,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Self {
+        Self::of(|| equilibrium::solve(scenario, proceed))
+    }
+
+    /// What was solved.
+    pub(crate) fn scenario(&self) -> &fishbone::scenario::Scenario {
+        &self.solved.scenario
+    }
+
+    /// What is found, with the time that took.
+    pub(crate) fn of(find: impl FnOnce() -> equilibrium::Equilibrium) -> Self {
         let start = Instant::now();
-        let solved = equilibrium::solve(scenario, proceed);
+        let solved = find();
         Self {
             solved,
             solve_time: start.elapsed().as_secs_f64(),
@@ -80,11 +100,7 @@ pub(crate) struct Equilibrium {
 impl Equilibrium {
     #[getter]
     fn status(&self) -> &'static str {
-        match self.solved.status {
-            Status::Converged => "converged",
-            Status::Infeasible => "infeasible",
-            Status::NotConverged => "not_converged",
-        }
+        status_name(self.solved.status)
     }
 
     #[getter]
@@ -365,6 +381,13 @@ impl Equilibrium {
             .filter(|(_, piece)| matches!(piece, Piece::Rigid))
             .map(|(element, _)| (spine.u[element], spine.u[element + 1]))
             .collect()
+    }
+
+    /// Follows it while a support moves.
+    ///
+    /// Errors: `ValueError`, one line, where there is nothing to follow.
+    fn tracker(&self, support: usize) -> PyResult<Tracker> {
+        Tracker::new(&self.solved, support)
     }
 
     /// Its first-order conditions, factorised with the GIL released.

@@ -5,6 +5,7 @@ mod batch;
 mod equilibrium;
 mod scenario;
 mod sensitivity;
+mod tracker;
 
 /// The compiled core of fishbone; `fishbone` itself is its public face.
 #[pyo3::pymodule]
@@ -17,6 +18,8 @@ mod _core {
     use crate::scenario::Scenario;
     #[pymodule_export]
     use crate::sensitivity::Sensitivity;
+    #[pymodule_export]
+    use crate::tracker::Tracker;
 
     #[pymodule_export]
     #[expect(non_upper_case_globals, reason = "the name Python expects")]

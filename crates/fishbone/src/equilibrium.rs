@@ -140,9 +140,23 @@ impl Units {
 pub fn solve(scenario: &Scenario, proceed: &mut dyn FnMut() -> ControlFlow<()>) -> Equilibrium {
     let belt = Belt::new(&scenario.belt).expect("a validated scenario");
     match scenario.solver.method {
-        Method::Intrinsic => intrinsic::solve(scenario, &belt, proceed),
+        Method::Intrinsic => intrinsic::solve(scenario, &belt, None, proceed),
         Method::Ritz => ritz::solve(scenario, &belt, proceed),
     }
+}
+
+/// The same from a shape on the scenario's mesh in place of the guess.
+pub(crate) fn solve_from(scenario: &Scenario, shape: &BeltPoint) -> Equilibrium {
+    let belt = Belt::new(&scenario.belt).expect("a validated scenario");
+    intrinsic::solve(scenario, &belt, Some(shape), &mut || {
+        ControlFlow::Continue(())
+    })
+}
+
+/// Whether the ribs of a shape are apart on the whole board.
+pub(crate) fn is_settled(scenario: &Scenario, program: &BeltProgram, point: &BeltPoint) -> bool {
+    let belt = Belt::new(&scenario.belt).expect("a validated scenario");
+    intrinsic::is_settled(scenario, &belt, program, point)
 }
 
 /// Two points of the belt that are held at a distance from each other.

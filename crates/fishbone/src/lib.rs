@@ -45,3 +45,4 @@ pub mod solver;
 pub mod spine;
 pub mod strip;
 pub mod surface;
+pub mod tracker;

@@ -19,10 +19,10 @@ use crate::element::block::{Block, LANES, Motions};
 use crate::energy::EnergyModel;
 use crate::lie::{Pose, Twist};
 use crate::solver::chain::NodeVector;
-use crate::solver::{BOUNDS, Bounds, Linearisation, Program, Rows, Values};
+use crate::solver::{BOUNDS, Bounds, CopyFrom, Linearisation, Program, Rows, RowsByNode, Values};
 use crate::spine::turn;
 use crate::strip::FURTHER;
-use nalgebra::{Matrix4, Matrix6, UnitQuaternion, Vector2, Vector3, Vector4, Vector6};
+use nalgebra::{Matrix4, Matrix6, Rotation3, UnitQuaternion, Vector2, Vector3, Vector4, Vector6};
 
 /// What joins a node to the next.
 #[expect(
@@ -73,6 +73,13 @@ pub struct BeltPoint {
     pub fields: Vec<Vector2<f64>>,
     /// Pose of every node; the first is an unknown, the others follow from it and the fields.
     pub poses: Vec<Pose>,
+}
+
+impl CopyFrom for BeltPoint {
+    fn copy_from(&mut self, other: &Self) {
+        self.fields.copy_from_slice(&other.fields);
+        self.poses.copy_from_slice(&other.poses);
+    }
 }
 
 impl Piece {
@@ -413,6 +420,16 @@ impl BeltProgram {
         shares[end].pull(&point.poses[piece + end])
     }
 
+    /// Moves a support that holds a node by position and frame.
+    pub fn move_support(&mut self, support: usize, pose: &Pose) {
+        let [x, y, z] = pose.position.into();
+        let frame =
+            UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(pose.frame));
+        let support = &mut self.supports[support];
+        support.position = [Some(x), Some(y), Some(z)];
+        support.hold = Hold::Frame(frame);
+    }
+
     /// Force and moment of every support on the belt, world axes, about the support's point.
     pub fn reactions(
         &self,
@@ -490,6 +507,12 @@ impl Program for BeltProgram {
             .constraints
             .extend(links.map(|link| link.value(point)));
         values.objective.is_finite()
+    }
+
+    fn constraint_jacobians(&self, point: &BeltPoint, into: &mut [RowsByNode]) {
+        for (support, rows) in self.supports.iter().zip(into) {
+            *rows = support.jacobian(&point.poses[support.node]);
+        }
     }
 
     fn linearise(
@@ -623,9 +646,9 @@ impl BeltProgram {
         multipliers: &[Rows],
         into: &mut Linearisation,
     ) {
+        self.constraint_jacobians(point, &mut into.constraints);
         for (i, support) in self.supports.iter().enumerate() {
             let pose = &point.poses[support.node];
-            into.constraints[i] = support.jacobian(pose);
             into.diagonal.nodes[i].hessian = support.hessian(pose, &multipliers[i]);
         }
         for (link, rows) in self.links.iter().zip(&mut into.links) {

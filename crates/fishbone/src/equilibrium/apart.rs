@@ -46,7 +46,7 @@ pub(super) fn keep_apart(
 
 /// The first element of which ribs cross, or are held by an edge that they no longer reach: taken for another shape, it
 /// would bound this one for nothing.
-fn unsettled(program: &BeltProgram, spine: &Spine) -> Option<usize> {
+pub(super) fn unsettled(program: &BeltProgram, spine: &Spine) -> Option<usize> {
     let crossing = crossings(spine).first().copied();
     crossing.or_else(|| {
         let is_bounded = |(_, element): (usize, &Element)| element.further != [None; FURTHER];

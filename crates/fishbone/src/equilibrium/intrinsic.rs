@@ -1,6 +1,6 @@
 //! The intrinsic method: the interior-point search in the two fields bend and rib slope.
 
-use super::apart::keep_apart;
+use super::apart::{keep_apart, unsettled};
 use super::assembly::Assembly;
 use super::search::{Search, is_flat_under_load};
 use super::{
@@ -22,10 +22,11 @@ const CLEARLY_MISSED: f64 = 1e-6;
 const CROSSING: &str = "no ribs found that do not cross: the bends, arcs and square ribs of the board are too close together \
                         for its width; make it narrower or the segments longer";
 
-/// Finds a minimum of the energy in the two fields.
+/// Finds a minimum of the energy in the two fields, from a shape on the scenario's mesh or, without one, from the guess.
 pub(super) fn solve(
     scenario: &Scenario,
     belt: &Belt,
+    from: Option<&BeltPoint>,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Equilibrium {
     let units = Units::of(belt);
@@ -36,7 +37,7 @@ pub(super) fn solve(
             (found, Status::Infeasible, message, None)
         }
         None => {
-            let (found, crossing) = find(scenario, &assembly, proceed);
+            let (found, crossing) = find(scenario, &assembly, from, proceed);
             let twice = said_twice(scenario, &found.program);
             let (status, message) = judge(scenario, &found.solution, crossing, twice.as_deref());
             (found, status, message, twice)
@@ -117,15 +118,32 @@ fn start(scenario: &Scenario, assembly: &Assembly) -> Found {
 fn find(
     scenario: &Scenario,
     assembly: &Assembly,
+    from: Option<&BeltPoint>,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> (Found, Option<f64>) {
     let search = Search::of(scenario);
     let mut program = assembly.program(scenario.elements());
-    let finer = scenario.elements() > scenario.default_elements();
-    let coarse = finer.then(|| assembly.program(scenario.default_elements()));
-    let solution = search.run(&program, coarse.as_ref(), proceed);
+    let solution = match from {
+        Some(shape) => search.from(&program, shape.clone(), proceed),
+        None => {
+            let finer = scenario.elements() > scenario.default_elements();
+            let coarse = finer.then(|| assembly.program(scenario.default_elements()));
+            search.run(&program, coarse.as_ref(), proceed)
+        }
+    };
     let (solution, crossing) = keep_apart(assembly, &search, &mut program, solution, proceed);
     (Found { program, solution }, crossing)
+}
+
+/// Whether the ribs of a shape are apart on the whole board, and held by no edge that they do not reach.
+pub(super) fn is_settled(
+    scenario: &Scenario,
+    belt: &Belt,
+    program: &BeltProgram,
+    point: &BeltPoint,
+) -> bool {
+    let spine = Assembly::new(scenario, belt).spine(program, point);
+    unsettled(program, &spine).is_none()
 }
 
 /// The supports and links that hold the same twice over, by name; `None` where all are independent.
@@ -337,7 +355,7 @@ fn reactions(
 }
 
 impl Units {
-    fn wrench(&self, (force, moment): (Vector3<f64>, Vector3<f64>)) -> Wrench {
+    pub(crate) fn wrench(&self, (force, moment): (Vector3<f64>, Vector3<f64>)) -> Wrench {
         Wrench {
             force: force * self.force(),
             moment: moment * self.energy,

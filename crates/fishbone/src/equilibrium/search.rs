@@ -75,9 +75,18 @@ impl Search {
         found: Solution<BeltPoint>,
         proceed: &mut Proceed,
     ) -> Solution<BeltPoint> {
-        let near = self
-            .minimise(program, inside(program, found.point), WARM, proceed)
-            .after(found.iterations);
+        let iterations = found.iterations;
+        self.from(program, found.point, proceed).after(iterations)
+    }
+
+    /// Searches from a shape of the same mesh; anew where that leads to no minimum.
+    pub(super) fn from(
+        &self,
+        program: &BeltProgram,
+        point: BeltPoint,
+        proceed: &mut Proceed,
+    ) -> Solution<BeltPoint> {
+        let near = self.minimise(program, inside(program, point), WARM, proceed);
         if is_done(&near) {
             return near;
         }

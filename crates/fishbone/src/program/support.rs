@@ -304,7 +304,7 @@ impl NodeSupport {
     }
 
     /// Force and moment of the support on the belt about its point, world axes.
-    pub(super) fn reaction(&self, pose: &Pose, multipliers: &Rows) -> (Vector3<f64>, Vector3<f64>) {
+    pub(crate) fn reaction(&self, pose: &Pose, multipliers: &Rows) -> (Vector3<f64>, Vector3<f64>) {
         let pull = self.jacobian(pose).tr_mul(multipliers);
         let force: Vector3<f64> = pull.fixed_rows::<3>(0).into_owned();
         let moment = pull.fixed_rows::<3>(3) - pose.position.cross(&force);

@@ -26,30 +26,30 @@ pub fn minimise<P: Program>(
 /// An objective below minus this, in its unit, has no least.
 const BOTTOMLESS: f64 = 1e12;
 
-/// Everything that changes from one iteration to the next.
-struct State<'a, P: Program> {
-    program: &'a P,
-    settings: Settings,
-    weights: Vec<f64>,
+/// Everything that changes from one iteration to the next, and room for all that an iteration needs.
+pub(super) struct State<P: Program> {
+    pub(super) program: P,
+    pub(super) settings: Settings,
+    pub(super) weights: Vec<f64>,
     /// Inequalities in use at every stage.
     bounds: usize,
-    point: P::Point,
-    values: Values,
-    multipliers: Vec<Rows>,
-    bound_multipliers: Bounds,
-    barrier: f64,
+    pub(super) point: P::Point,
+    pub(super) values: Values,
+    pub(super) multipliers: Vec<Rows>,
+    pub(super) bound_multipliers: Bounds,
+    pub(super) barrier: f64,
     iteration: usize,
     interrupted: bool,
     /// Whether the derivatives are those of the restoration.
     restoring: bool,
     admissible: bool,
-    linear: Linearisation,
-    newton: Newton,
+    pub(super) linear: Linearisation,
+    pub(super) newton: Newton,
     filter: Filter,
-    trial: P::Point,
-    trial_values: Values,
+    pub(super) trial: P::Point,
+    pub(super) trial_values: Values,
     bound_step: Bounds,
-    gradient: Vec<NodeVector>,
+    pub(super) gradient: Vec<NodeVector>,
     targets: Vec<Rows>,
     plain_step: Vec<NodeVector>,
     plain_multiplier_step: Vec<Rows>,
@@ -57,24 +57,24 @@ struct State<'a, P: Program> {
 
 /// How far a step may go: along the unknowns and along the bounds' multipliers.
 #[derive(Clone, Copy)]
-struct Lengths {
-    primal: f64,
-    dual: f64,
+pub(super) struct Lengths {
+    pub(super) primal: f64,
+    pub(super) dual: f64,
 }
 
-impl<'a, P: Program> State<'a, P> {
-    fn new(program: &'a P, settings: Settings, mut point: P::Point) -> Self {
+impl<P: Program> State<P> {
+    pub(super) fn new(program: P, settings: Settings, mut point: P::Point) -> Self {
         let weights = program.weights();
-        let linear = Linearisation::new(program);
+        let linear = Linearisation::new(&program);
         let newton = Newton::new(&linear, program.linked_nodes(), &weights, program.bounds());
         let mut values = Values::default();
         let admissible = program.evaluate(&mut point, &mut values);
         let rows = vec![Rows::zeros(); linear.constraints.len() + linear.links.len()];
         let bounds = vec![[0.0; BOUNDS]; weights.len()];
         let mut state = Self {
+            bounds: program.bounds(),
             program,
             settings,
-            bounds: program.bounds(),
             filter: Filter::new(violation(&values)),
             trial: point.clone(),
             trial_values: values.clone(),
@@ -176,7 +176,7 @@ impl<'a, P: Program> State<'a, P> {
         }
     }
 
-    fn linearise(&mut self) {
+    pub(super) fn linearise(&mut self) {
         self.restoring = false;
         self.program.linearise(
             &self.point,
@@ -186,7 +186,7 @@ impl<'a, P: Program> State<'a, P> {
         );
     }
 
-    fn residuals(&mut self) -> Residuals {
+    pub(super) fn residuals(&mut self) -> Residuals {
         self.gradient.copy_from_slice(&self.linear.gradient);
         Residuals {
             stationarity: self.stationarity(),
@@ -239,14 +239,14 @@ impl<'a, P: Program> State<'a, P> {
     }
 
     /// Newton step of the barrier problem.
-    fn find_step(&mut self) {
+    pub(super) fn find_step(&mut self) {
         self.find_barrier_gradient();
         self.newton
             .solve(&self.linear, &self.gradient, &self.values.constraints);
     }
 
     /// Gradient of the barrier problem's Lagrangian.
-    fn find_barrier_gradient(&mut self) {
+    pub(super) fn find_barrier_gradient(&mut self) {
         self.gradient.copy_from_slice(&self.linear.gradient);
         for (k, slacks) in self.values.slacks.iter().enumerate() {
             let push = self.barrier * self.weights[k];
@@ -289,7 +289,7 @@ impl<'a, P: Program> State<'a, P> {
     }
 
     /// Step of the bounds' multipliers, and the lengths that keep slacks and multipliers positive.
-    fn find_bound_step(&mut self) -> Lengths {
+    pub(super) fn find_bound_step(&mut self) -> Lengths {
         let keep = (1.0 - self.barrier).clamp(0.99, 1.0 - 1e-9);
         let mut lengths = Lengths {
             primal: 1.0,
@@ -299,7 +299,8 @@ impl<'a, P: Program> State<'a, P> {
             for (b, step) in steps.iter_mut().enumerate().take(self.bounds) {
                 let (slack, multiplier) = (self.values.slacks[k][b], self.bound_multipliers[k][b]);
                 let rate = self.newton.slack_rate(&self.linear, k, b);
-                *step = (self.barrier * self.weights[k] - multiplier * rate) / slack - multiplier;
+                let central = self.barrier * self.weights[k] / slack;
+                *step = central - multiplier - self.newton.yielding(k, b, rate);
                 if rate < 0.0 {
                     lengths.primal = lengths.primal.min(-keep * slack / rate);
                 }
@@ -371,7 +372,7 @@ impl<'a, P: Program> State<'a, P> {
     }
 
     /// Evaluates the trial point; false outside the domain.
-    fn try_step(&mut self, length: f64) -> bool {
+    pub(super) fn try_step(&mut self, length: f64) -> bool {
         self.program
             .retract(&self.point, &self.newton.step, length, &mut self.trial);
         self.program
@@ -379,7 +380,7 @@ impl<'a, P: Program> State<'a, P> {
     }
 
     /// Takes the trial point and moves the multipliers along.
-    fn accept(&mut self, primal: f64, dual: f64) {
+    pub(super) fn accept(&mut self, primal: f64, dual: f64) {
         const SPREAD: f64 = 1e10;
         self.take_trial();
         for (multiplier, step) in self
@@ -398,7 +399,7 @@ impl<'a, P: Program> State<'a, P> {
         }
     }
 
-    fn take_trial(&mut self) {
+    pub(super) fn take_trial(&mut self) {
         std::mem::swap(&mut self.point, &mut self.trial);
         std::mem::swap(&mut self.values, &mut self.trial_values);
     }
@@ -473,7 +474,7 @@ impl<'a, P: Program> State<'a, P> {
     }
 
     /// Puts the bounds' multipliers on the central path.
-    fn centre_bound_multipliers(&mut self) {
+    pub(super) fn centre_bound_multipliers(&mut self) {
         for (k, multipliers) in self.bound_multipliers.iter_mut().enumerate() {
             let push = self.barrier * self.weights[k];
             *multipliers = self.values.slacks[k].map(|slack| push / slack);
@@ -577,6 +578,13 @@ mod tests {
             values.slacks.iter().flatten().all(|slack| *slack > 0.0)
         }
 
+        fn constraint_jacobians(&self, _: &Ride, into: &mut [RowsByNode]) {
+            into.fill(RowsByNode::zeros());
+            into[0][(0, 0)] = 1.0;
+            into[0][(1, 6)] = 1.0;
+            into[1][(0, 0)] = f64::from(self.tied.is_none());
+        }
+
         fn linearise(
             &self,
             ride: &Ride,
@@ -610,10 +618,7 @@ mod tests {
             }
             into.gradient[0][0] = beyond + pulls(0) + multipliers[0][0];
             into.gradient[0][6] += multipliers[0][1];
-            into.constraints = vec![RowsByNode::zeros(); 2];
-            into.constraints[0][(0, 0)] = 1.0;
-            into.constraints[0][(1, 6)] = 1.0;
-            into.constraints[1][(0, 0)] = f64::from(self.tied.is_none());
+            self.constraint_jacobians(ride, &mut into.constraints);
             for rows in &mut into.links {
                 rows[0][(0, 0)] = -1.0;
                 rows[1][(0, 0)] = 1.0;

@@ -8,11 +8,13 @@
 mod border;
 pub mod chain;
 mod filter;
+mod follow;
 mod interior_point;
 mod kkt;
 mod newton;
 mod rank;
 
+pub use follow::{CopyFrom, Followed, Follower};
 pub use interior_point::minimise;
 pub use kkt::{Kkt, KktVector, Singular};
 pub use rank::dependent_constraints;
@@ -86,6 +88,9 @@ pub trait Program {
     /// Carries the states of a point along the chain and evaluates it; false outside the domain.
     fn evaluate(&self, point: &mut Self::Point, values: &mut Values) -> bool;
 
+    /// Derivatives of the constraints at nodes.
+    fn constraint_jacobians(&self, point: &Self::Point, into: &mut [RowsByNode]);
+
     /// Derivatives at a point that has been evaluated, of the objective plus multipliers times constraints; the second
     /// ones with `bounds` times the inequalities taken off.
     fn linearise(
@@ -104,6 +109,58 @@ pub trait Program {
         length: f64,
         into: &mut Self::Point,
     );
+}
+
+impl<P: Program> Program for &P {
+    type Point = P::Point;
+
+    fn stages(&self) -> usize {
+        (*self).stages()
+    }
+
+    fn constrained_nodes(&self) -> Vec<usize> {
+        (*self).constrained_nodes()
+    }
+
+    fn linked_nodes(&self) -> Vec<[usize; 2]> {
+        (*self).linked_nodes()
+    }
+
+    fn bounds(&self) -> usize {
+        (*self).bounds()
+    }
+
+    fn weights(&self) -> Vec<f64> {
+        (*self).weights()
+    }
+
+    fn evaluate(&self, point: &mut Self::Point, values: &mut Values) -> bool {
+        (*self).evaluate(point, values)
+    }
+
+    fn constraint_jacobians(&self, point: &Self::Point, into: &mut [RowsByNode]) {
+        (*self).constraint_jacobians(point, into);
+    }
+
+    fn linearise(
+        &self,
+        point: &Self::Point,
+        multipliers: &[Rows],
+        bounds: &Bounds,
+        into: &mut Linearisation,
+    ) {
+        (*self).linearise(point, multipliers, bounds, into);
+    }
+
+    fn retract(
+        &self,
+        point: &Self::Point,
+        step: &[NodeVector],
+        length: f64,
+        into: &mut Self::Point,
+    ) {
+        (*self).retract(point, step, length, into);
+    }
 }
 
 /// Settings of the minimisation.

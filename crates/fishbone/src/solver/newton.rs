@@ -2,7 +2,7 @@
 
 use super::border::Border;
 use super::chain::{Diagonal, Factor, NodeVector, TooConcave};
-use super::{Bounds, Curvature, Linearisation, Rows, RowsByNode, Values};
+use super::{BOUNDS, Bounds, Curvature, Linearisation, Rows, RowsByNode, Values};
 
 /// Compliance lent to the constraints so that the chain can be factorised without them; refinement takes it back.
 const COMPLIANCE: f64 = 1e-7;
@@ -12,6 +12,8 @@ const REFINEMENTS: usize = 2;
 #[derive(Debug, Clone)]
 pub(super) struct Newton {
     diagonal: Diagonal,
+    /// What every bound resists with: multiplier over slack as they were assembled.
+    stiffness: Bounds,
     factor: Factor,
     border: Border,
     weights: Vec<f64>,
@@ -38,6 +40,7 @@ impl Newton {
         let zeros = vec![NodeVector::zeros(); nodes];
         Self {
             diagonal: linear.diagonal.clone(),
+            stiffness: vec![[0.0; BOUNDS]; weights.len()],
             factor: Factor::new(weights.len()),
             multiplier_step: vec![Rows::zeros(); linear.constraints.len() + pairs.len()],
             border: Border::new(pairs, nodes),
@@ -72,9 +75,10 @@ impl Newton {
         for (k, controls) in self.diagonal.controls.iter_mut().enumerate() {
             for (b, gradient) in linear.slacks[k].iter().enumerate().take(self.bounds) {
                 let (slack, multiplier) = (values.slacks[k][b], bounds[k][b]);
-                if counts(slack, multiplier / self.weights[k]) {
-                    *controls += multiplier / slack * gradient * gradient.transpose();
-                }
+                let counted = counts(slack, multiplier / self.weights[k]);
+                let stiffness = if counted { multiplier / slack } else { 0.0 };
+                *controls += stiffness * gradient * gradient.transpose();
+                self.stiffness[k][b] = stiffness;
             }
         }
         for (i, term) in self.diagonal.nodes.iter_mut().enumerate() {
@@ -220,6 +224,11 @@ impl Newton {
     /// What the step still misses of a target at a node.
     fn missing(&self, linear: &Linearisation, i: usize, target: &Rows) -> Rows {
         linear.constraints[i] * self.step[self.diagonal.nodes[i].node] + target
+    }
+
+    /// What a bound's multiplier gives way by along the step.
+    pub(super) fn yielding(&self, stage: usize, bound: usize, rate: f64) -> f64 {
+        self.stiffness[stage][bound] * rate
     }
 
     /// Change of a slack along the step, to first order.

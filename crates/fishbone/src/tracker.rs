@@ -1,0 +1,261 @@
+//! Follows an equilibrium at the rate of a robot while one of its supports moves.
+
+use crate::equilibrium::{Equilibrium, Status, Units, Wrench, is_settled, solve_from};
+use crate::lie::{Pose, exp};
+use crate::program::{BeltPoint, BeltProgram, Piece};
+use crate::scenario::{Component, Scenario};
+use crate::solver::{Follower, Residuals};
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+use thiserror::Error;
+
+/// Why an equilibrium cannot be followed.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum NoTracker {
+    /// The method of the solve has no first-order conditions that it meets.
+    #[error("the source's method cannot follow: use solver.method = \"intrinsic\"")]
+    NoMultipliers,
+    /// There is no equilibrium.
+    #[error("there is nothing to follow: {0}")]
+    NotConverged(String),
+    /// The support does not hold all of a pose.
+    #[error(
+        "supports[{0}] does not hold a position and a rotation, all of both: nothing can be moved there"
+    )]
+    NotClamped(usize),
+}
+
+/// What became of a belt as its support moved.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Update {
+    /// Whether the belt is in equilibrium under the new pose; unless converged, the tracker stays where it was.
+    pub status: Status,
+    /// Whether the equilibrium that was followed ceased to exist or to be stable on the way, and this is another one.
+    pub snapped: bool,
+    /// Total potential of the shape that the tracker has now.
+    pub energy: f64,
+    /// Iterations.
+    pub iterations: usize,
+    /// How far the shape is from a solution of its discrete equations.
+    pub residuals: Residuals,
+}
+
+/// An equilibrium and the support that moves.
+pub struct Tracker {
+    scenario: Scenario,
+    support: usize,
+    follower: Follower<BeltProgram>,
+    /// Where the support is, in the units of the programme.
+    pose: Pose,
+    units: Units,
+    origin: Vector3<f64>,
+    /// What the potential of the programme lacks.
+    potential_of_origin: f64,
+    /// Whether ribs of one stretch may reach the edges of another.
+    has_bends: bool,
+}
+
+impl Tracker {
+    /// Starts at an equilibrium; the support is named by its place in the scenario.
+    ///
+    /// # Errors
+    ///
+    /// [`NoTracker`] unless it has converged and the support holds position and rotation.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such support.
+    pub fn new(equilibrium: &Equilibrium, support: usize) -> Result<Self, NoTracker> {
+        let solved = equilibrium.solved.as_ref();
+        let solved = solved.ok_or(NoTracker::NoMultipliers)?;
+        if equilibrium.status != Status::Converged {
+            return Err(NoTracker::NotConverged(equilibrium.message.clone()));
+        }
+        let scenario = equilibrium.scenario.clone();
+        let held = &scenario.supports[support];
+        let (Some(position), Some(frame), None) = (held.point(), held.frame(), held.hinge) else {
+            return Err(NoTracker::NotClamped(support));
+        };
+        let follower = Follower::new(
+            solved.program.clone(),
+            scenario.solver.tolerance,
+            solved.point.clone(),
+            &solved.multipliers,
+            &solved.bound_multipliers,
+        );
+        let bends = |piece: &Piece| match piece {
+            Piece::Strip(element) => element.geodesic != 0.0,
+            Piece::Joint { angle } => *angle != 0.0,
+            Piece::Rigid { .. } => false,
+        };
+        let (units, origin) = (solved.units, solved.origin);
+        let stored = follower.values().objective * units.energy;
+        Ok(Self {
+            support,
+            pose: Pose {
+                frame,
+                position: (position - origin) / units.length,
+            },
+            has_bends: solved.program.pieces.iter().any(bends),
+            potential_of_origin: equilibrium.energy - stored,
+            scenario,
+            follower,
+            units,
+            origin,
+        })
+    }
+
+    /// Moves the support to a position and a rotation vector, world axes, and the belt with it.
+    ///
+    /// Nothing is allocated where the equilibrium is followed and the board has neither links nor bends.
+    pub fn update(&mut self, position: &Vector3<f64>, rotation: &Vector3<f64>) -> Update {
+        let goal = Pose {
+            frame: exp(rotation),
+            position: (position - self.origin) / self.units.length,
+        };
+        let (from, support) = (self.pose, self.support);
+        let turn = turn_between(&from.frame, &goal.frame);
+        let followed = self.follower.follow(&mut |program, share| {
+            let between = Pose {
+                position: from.position.lerp(&goal.position, share),
+                frame: match share < 1.0 {
+                    true => from.frame * exp(&(share * turn)),
+                    false => goal.frame,
+                },
+            };
+            program.move_support(support, &between);
+        });
+        if !followed.kept || !self.is_settled() {
+            return self.search(goal, position, rotation, &turn, followed.iterations);
+        }
+        self.pose = goal;
+        Update {
+            status: Status::Converged,
+            snapped: false,
+            energy: self.energy(),
+            iterations: followed.iterations,
+            residuals: followed.residuals,
+        }
+    }
+
+    /// Looks for a minimum from the last shape where that could not be followed.
+    fn search(
+        &mut self,
+        goal: Pose,
+        position: &Vector3<f64>,
+        rotation: &Vector3<f64>,
+        turn: &Vector3<f64>,
+        iterations: usize,
+    ) -> Update {
+        let scenario = self.scenario_at(position, rotation);
+        let found = solve_from(&scenario, self.follower.point());
+        let moved = (goal.position - self.pose.position).norm() + turn.norm();
+        let snapped = found.status == Status::Converged && self.has_jumped(&found, moved);
+        match Self::new(&found, self.support) {
+            Ok(other) => *self = other,
+            Err(_) => self.follower.return_to_start(|program| {
+                program.move_support(self.support, &self.pose);
+            }),
+        }
+        Update {
+            status: found.status,
+            snapped,
+            energy: self.energy(),
+            iterations: iterations + found.iterations,
+            residuals: found.residuals,
+        }
+    }
+
+    /// Whether a shape is farther from the last than one that follows a support moved so far.
+    fn has_jumped(&self, found: &Equilibrium, moved: f64) -> bool {
+        const SMOOTH: f64 = 10.0;
+        const SMALL: f64 = 1e-3;
+        let now = found.spine.pose.iter().map(|pose| pose.position);
+        let before = self.positions();
+        let distances = now.zip(before).map(|(now, before)| (now - before).norm());
+        let farthest = distances.fold(0.0, f64::max) / self.units.length;
+        farthest > SMOOTH * moved + SMALL
+    }
+
+    fn is_settled(&self) -> bool {
+        !self.has_bends
+            || is_settled(
+                &self.scenario,
+                self.follower.program(),
+                self.follower.point(),
+            )
+    }
+
+    /// The scenario with the support elsewhere.
+    fn scenario_at(&self, position: &Vector3<f64>, rotation: &Vector3<f64>) -> Scenario {
+        let mut scenario = self.scenario.clone();
+        let support = &mut scenario.supports[self.support];
+        support.position = Some([0, 1, 2].map(|i| Component::Held(position[i])));
+        support.rotation = Some((*rotation).into());
+        (support.euler, support.quaternion) = (None, None);
+        scenario
+    }
+
+    /// The present equilibrium, solved anew from its own shape.
+    pub fn equilibrium(&self) -> Equilibrium {
+        let position = self.origin + self.pose.position * self.units.length;
+        let rotation = crate::lie::log(&self.pose.frame);
+        let scenario = self.scenario_at(&position, &rotation);
+        solve_from(&scenario, self.follower.point())
+    }
+
+    /// Number of nodes.
+    pub fn nodes(&self) -> usize {
+        self.point().poses.len()
+    }
+
+    fn point(&self) -> &BeltPoint {
+        self.follower.point()
+    }
+
+    /// Total potential.
+    pub fn energy(&self) -> f64 {
+        self.follower.values().objective * self.units.energy + self.potential_of_origin
+    }
+
+    /// Positions of the nodes.
+    pub fn positions(&self) -> impl Iterator<Item = Vector3<f64>> {
+        let poses = self.point().poses.iter();
+        poses.map(|pose| self.origin + pose.position * self.units.length)
+    }
+
+    /// Frames of the nodes.
+    pub fn frames(&self) -> impl Iterator<Item = &Matrix3<f64>> {
+        self.point().poses.iter().map(|pose| &pose.frame)
+    }
+
+    /// Bend at the nodes.
+    pub fn bends(&self) -> impl Iterator<Item = f64> {
+        let fields = self.point().fields.iter();
+        fields.map(|fields| fields[0] / self.units.length)
+    }
+
+    /// Rib slope at the nodes.
+    pub fn rib_slopes(&self) -> impl Iterator<Item = f64> {
+        self.point().fields.iter().map(|fields| fields[1])
+    }
+
+    /// What a support does to the belt.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such support.
+    pub fn reaction(&self, support: usize) -> Wrench {
+        let program = self.follower.program();
+        let rows = &self.follower.multipliers()[support];
+        let held = &program.supports[support];
+        self.units
+            .wrench(held.reaction(&self.point().poses[held.node], rows))
+    }
+}
+
+/// The turn from one frame to another as a rotation vector in the axes of the first.
+fn turn_between(from: &Matrix3<f64>, to: &Matrix3<f64>) -> Vector3<f64> {
+    let turn = Rotation3::from_matrix_unchecked(from.tr_mul(to));
+    UnitQuaternion::from_rotation_matrix(&turn).scaled_axis()
+}

@@ -1,0 +1,196 @@
+"""Following an equilibrium while a support moves: the same shapes as solved afresh, and snaps are told."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fishbone as fb
+from helpers import ENERGIES, Energy, rotation_vector
+
+SCENARIOS = Path(__file__).parents[1] / "scenarios"
+END = np.array([0.0, 0.5, 0.1])
+
+
+def example(energy: Energy = "wunderlich", elements: int = 64, **tables: Any) -> fb.Scenario:
+    """The belt of the source's first example."""
+    ends = [
+        {"at": "start", "position": [0.0, 0.0, 0.0], "rotation": [0.0, 0.0, 0.0]},
+        {"at": "end", "position": END.tolist(), "rotation": [0.0, 0.0, 0.0]},
+    ]
+    belt = {"width": 0.1, "rigidity": 1.0, "segments": [{"kind": "straight", "length": 1.0}]}
+    given = {"energy": energy, "belt": belt, "supports": ends, "solver": {"elements": elements}} | tables
+    return fb.Scenario.from_dict(given)
+
+
+def way(count: int) -> list[tuple[np.ndarray, np.ndarray]]:
+    """A smooth closed path of poses around the example's, which it begins and ends with."""
+    angles = np.linspace(0.0, 2.0 * np.pi, count + 1)
+    shift = 0.03 * np.column_stack([np.sin(angles), 0.7 * np.sin(2.0 * angles), np.cos(angles) - 1.0])
+    turn = 0.15 * np.column_stack([np.sin(angles), np.sin(3.0 * angles), 0.4 * (np.cos(angles) - 1.0)])
+    return [(END + x, r) for x, r in zip(shift, turn, strict=True)]
+
+
+@pytest.mark.parametrize("energy", ENERGIES)
+def test_tracker_has_the_energy_of_the_equilibrium_solved_afresh(energy: Energy) -> None:
+    """At every tenth pose; complementarity is half the tolerance in the tracker and a tenth in a solve."""
+    tracker = fb.Tracker(example(energy))
+    for k, (position, rotation) in enumerate(way(200)):
+        update = tracker.update(position, rotation)
+        assert (update.status, update.snapped) == ("converged", False)
+        assert update.residual <= 1e-8
+        if k % 10 == 0:
+            fresh = example(energy).to_dict()
+            fresh["supports"][1] |= {"position": position.tolist(), "rotation": rotation.tolist()}
+            assert update.energy == pytest.approx(fb.solve(fb.Scenario.from_dict(fresh)).energy, rel=1e-6)
+
+
+@pytest.mark.parametrize("energy", ENERGIES)
+def test_tracker_keeps_to_the_branch_of_ten_times_finer_steps(energy: Energy) -> None:
+    """Not one wrong branch, whatever the step."""
+    coarse, fine = fb.Tracker(example(energy)), fb.Tracker(example(energy))
+    poses = way(2000)
+    for k, (position, rotation) in enumerate(poses):
+        energy_now = fine.update(position, rotation).energy
+        if k % 10 == 0:
+            assert coarse.update(position, rotation).energy == pytest.approx(energy_now, rel=1e-6)
+
+
+def test_update_takes_two_newton_steps_on_a_smooth_path() -> None:
+    """A prediction and one correction."""
+    tracker = fb.Tracker(example())
+    iterations = [tracker.update(*pose).iterations for pose in way(2000)]
+    assert np.percentile(iterations, 99) <= 2
+
+
+def test_shape_and_reactions_are_those_of_the_equilibrium() -> None:
+    """At no extra solve."""
+    tracker = fb.Tracker(example())
+    for pose in way(100)[:20]:
+        tracker.update(*pose)
+    equilibrium = tracker.equilibrium()
+    assert equilibrium.status == "converged"
+    np.testing.assert_allclose(tracker.u, equilibrium.u)
+    np.testing.assert_allclose(tracker.position, equilibrium.position, atol=1e-6)
+    np.testing.assert_allclose(tracker.frame, equilibrium.frame, atol=1e-5)
+    np.testing.assert_allclose(tracker.bend, equilibrium.bend, atol=1e-3)
+    np.testing.assert_allclose(tracker.rib_slope, equilibrium.rib_slope, atol=1e-3)
+    for support in ("start", "end"):
+        for followed, solved in zip(tracker.reaction(support), equilibrium.reaction(support), strict=True):
+            np.testing.assert_allclose(followed, solved, rtol=1e-5, atol=1e-4)
+
+
+def test_pose_of_the_support_is_met() -> None:
+    """By the last node, to rounding."""
+    tracker = fb.Tracker(example())
+    position, rotation = way(40)[7]
+    tracker.update(position, rotation)
+    np.testing.assert_allclose(tracker.position[-1], position, atol=1e-8)
+    assert tracker.equilibrium().scenario.to_dict()["supports"][1]["position"] == pytest.approx(position.tolist())
+
+
+def planar(elements: int = 80) -> fb.Scenario:
+    """A planar arch, narrow so that it has no ribs to speak of."""
+    return example(
+        "sadowsky",
+        elements,
+        supports=[
+            {"at": "start", "position": [0.0, 0.0, 0.0], "rotation": [0.0, 0.0, 0.0]},
+            {"at": "end", "position": [0.0, 0.9, 0.0], "rotation": [0.0, 0.0, 0.0]},
+        ],
+    )
+
+
+def test_snap_is_told_and_leads_to_less_energy() -> None:
+    """An arch whose end is turned against it lets go of its energy once, and then only."""
+    tracker = fb.Tracker(planar())
+    energies, snaps = [tracker.energy], [False]
+    for angle in np.linspace(0.0, -2.2, 221):
+        update = tracker.update([0.0, 0.9, 0.0], [0.0, 0.0, angle])
+        assert update.status == "converged"
+        energies.append(update.energy)
+        snaps.append(update.snapped)
+    drops = np.diff(energies)
+    assert np.flatnonzero(snaps[1:]).tolist() == np.flatnonzero(drops < -1.0).tolist()
+    assert sum(snaps) == 1
+
+
+def test_pose_out_of_reach_leaves_the_tracker_where_it_was() -> None:
+    """And the next update goes on from there."""
+    tracker = fb.Tracker(example())
+    before = tracker.update(*way(40)[3])
+    position = tracker.position
+    failed = tracker.update([0.0, 2.0, 0.0], [0.0, 0.0, 0.0])
+    assert failed.status == "infeasible"
+    assert not failed.snapped
+    assert failed.energy == pytest.approx(before.energy, rel=1e-12)
+    np.testing.assert_allclose(tracker.position, position, atol=1e-12)
+    after = tracker.update(*way(40)[4])
+    assert (after.status, after.snapped) == ("converged", False)
+
+
+def test_large_update_is_made_in_steps() -> None:
+    """One update over a whole sixth of the path ends where many small ones do."""
+    small, large = fb.Tracker(example()), fb.Tracker(example())
+    poses = way(300)
+    for pose in poses[:51]:
+        update = small.update(*pose)
+    assert large.update(*poses[50]).energy == pytest.approx(update.energy, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", ["curved", "bent", "hinge", "polystyrene"])
+def test_boards_of_all_kinds_are_followed(name: str) -> None:
+    """Arcs, corners, stiffeners, materials in SI units."""
+    scenario = fb.load(SCENARIOS / f"{name}.toml")
+    end = scenario.to_dict()["supports"][-1]
+    rotation = np.array(fb.solve(scenario).frame[-1])
+    tracker = fb.Tracker(scenario, -1)
+    length = float(tracker.u[-1])
+    for k in range(1, 11):
+        position = np.array(end["position"]) - 0.002 * k * length * np.array([0.0, 1.0, 0.3])
+        update = tracker.update(position, rotation_vector(rotation))
+        assert update.status == "converged"
+    again = fb.solve(tracker.equilibrium().scenario)
+    assert tracker.energy == pytest.approx(again.energy, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("position", "rotation", "said"),
+    [
+        ([0.0, 0.5], [0.0, 0.0, 0.0], r"position: found shape \(2,\), allowed \(3,\)"),
+        ([0.0, 0.5, 0.0], np.eye(3), r"rotation: found shape \(3, 3\), allowed \(3,\)"),
+        ([0.0, float("nan"), 0.0], [0.0, 0.0, 0.0], r"position: found .*nan.*, allowed finite numbers"),
+    ],
+)
+def test_what_is_no_pose_is_refused(position: Any, rotation: Any, said: str) -> None:
+    """In one line; the tracker is not harmed."""
+    tracker = fb.Tracker(example())
+    with pytest.raises(fb.InvalidArgument, match=said):
+        tracker.update(position, rotation)
+    assert tracker.update(END, [0.0, 0.0, 0.0]).status == "converged"
+
+
+def test_what_cannot_be_followed_is_refused() -> None:
+    """No equilibrium, no clamp, no multipliers, no such support."""
+    with pytest.raises(fb.NoTracker, match="nothing to follow"):
+        fb.Tracker(
+            example(
+                supports=[
+                    {"at": "start", "position": [0.0, 0.0, 0.0], "rotation": [0.0, 0.0, 0.0]},
+                    {"at": "end", "position": [0.0, 1.5, 0.0], "rotation": [0.0, 0.0, 0.0]},
+                ]
+            )
+        )
+    pinned = [
+        {"at": "start", "position": [0.0, 0.0, 0.0], "rotation": [0.0, 0.0, 0.0]},
+        {"at": "end", "position": [0.0, 0.8, 0.1]},
+    ]
+    with pytest.raises(fb.NoTracker, match=r"supports\[1\] does not hold"):
+        fb.Tracker(example(supports=pinned))
+    with pytest.raises(fb.NoTracker, match="source's method"):
+        fb.Tracker(example("fishbone", solver={"method": "ritz"}))
+    with pytest.raises(fb.NoSupport):
+        fb.Tracker(example(), 5)
