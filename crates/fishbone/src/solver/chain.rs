@@ -316,15 +316,12 @@ fn eliminate(
         toward[1][7] + dot(&second[1], &toward[1]) + c[3][3],
     ];
     for j in 0..2 {
-        let (by_first, by_second) = (before[j], toward[j]);
-        for i in 0..2 {
-            before[j][6 + i] = c[j][i] + dot(&first[i], &by_first);
-            toward[j][6 + i] = c[2 + j][i] + dot(&first[i], &by_second);
-        }
-        for row in 0..6 {
-            before[j][row] += state_first[j][row];
-            toward[j][row] += state_second[j][row];
-        }
+        let own = [dot(&first[0], &before[j]), dot(&first[1], &before[j])];
+        let next = [dot(&first[0], &toward[j]), dot(&first[1], &toward[j])];
+        add_scaled(&mut before[j], 1.0, &state_first[j]);
+        add_scaled(&mut toward[j], 1.0, &state_second[j]);
+        [before[j][6], before[j][7]] = [c[j][0] + own[0], c[j][1] + own[1]];
+        [toward[j][6], toward[j][7]] = [c[2 + j][0] + next[0], c[2 + j][1] + next[1]];
     }
     if stage.tie != Vector2::zeros() {
         follow(stage, &pivot, &mut toward, &mut before);

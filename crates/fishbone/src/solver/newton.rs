@@ -2,11 +2,13 @@
 
 use super::border::Border;
 use super::chain::{Diagonal, Factor, NodeVector, TooConcave};
-use super::{BOUNDS, Bounds, Curvature, Linearisation, Rows, RowsByNode, Values};
+use super::{BOUNDS, Bounds, Curvature, Linearisation, Rows, RowsByNode, Values, larger};
 
 /// Compliance lent to the constraints so that the chain can be factorised without them; refinement takes it back.
 const COMPLIANCE: f64 = 1e-7;
 const REFINEMENTS: usize = 2;
+/// What a step may miss of its targets, far below any tolerance.
+const EXACT: f64 = 1e-12;
 
 /// The factorised Newton system and its solution, with the room it needs.
 #[derive(Debug, Clone)]
@@ -173,9 +175,14 @@ impl Newton {
             for (step, correction) in self.step.iter_mut().zip(&self.correction) {
                 *step += correction;
             }
+            let mut most: f64 = 0.0;
             for (i, target) in at_nodes.iter().enumerate() {
-                let force = self.missing(linear, i, target) / COMPLIANCE;
-                self.multiplier_step[i] += force;
+                let missing = self.missing(linear, i, target);
+                self.multiplier_step[i] += missing / COMPLIANCE;
+                most = larger(most, missing.amax());
+            }
+            if most <= EXACT && between.is_empty() {
+                break;
             }
             self.right.fill(NodeVector::zeros());
         }
