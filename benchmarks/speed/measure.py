@@ -15,10 +15,12 @@ import numpy as np
 from rich.console import Console
 from rich.progress import track
 
+import fishbone as fb
 import random_poses
 from cases import curve, shell
-from speed.problem import EXAMPLES, Answer, Pose, end_pose, path
+from speed.problem import ENERGIES, EXAMPLES, Answer, Pose, end_pose, path, scenario
 from speed.rivals import ENTRIES, OURS, Entry
+from speed.stopwatch import timed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -38,6 +40,8 @@ PATIENCE = 60.0
 PATH = 10_000
 """Poses of the path; a rival of fewer updates does stretches of it, in the same steps."""
 STRETCH = 20
+FINER = 10
+"""Steps to check a branch by, of one along the path."""
 MESHES = (100, 1000, 10_000)
 BATCH = 10_000
 ENERGY: Energy = "fishbone"
@@ -188,6 +192,52 @@ def stretches(count: int, updates: int) -> list[range]:
     return [range(part * count // parts, part * count // parts + updates // parts + 1) for part in range(parts)]
 
 
+def branches() -> list[Record]:
+    """Whether the tracker keeps to its branch: the energies along the path against those in ten times finer steps."""
+    cases = [(energy, example) for energy in ENERGIES for example in EXAMPLES]
+    return [_branch(energy, example) for energy, example in _progress(cases, "branches")]
+
+
+def _branch(energy: Energy, example: str) -> Record:
+    pose = end_pose(example)
+    coarse, fine = (fb.Tracker(scenario(energy, WARM_ELEMENTS, pose)) for _ in range(2))
+    apart, snaps = 0, 0
+    for at, pose in enumerate(path(example, FINER * PATH + 1)):
+        update = fine.update(pose.position, pose.rotation)
+        if at % FINER == 0:
+            followed = coarse.update(pose.position, pose.rotation)
+            apart += abs(followed.energy / update.energy - 1.0) > SAME
+            snaps += followed.snapped
+    return {"energy_model": energy, "example": example, "updates": PATH + 1, "apart": apart, "snaps": snaps}
+
+
+def derivatives() -> list[Record]:
+    """Time of what is had from the factorised system, against an iteration of the solve."""
+    return [_derivatives(example) for example in _progress(EXAMPLES, "derivatives")]
+
+
+def _derivatives(example: str) -> Record:
+    given = scenario(ENERGY, COLD_ELEMENTS, end_pose(example))
+    belt = fb.solve(given, strict=True)
+    system = belt.sensitivity()
+    motion = np.zeros((2, 6))
+    motion[1, 1] = 1.0
+    weights = np.ones_like(belt.position)
+    solve = _least(lambda: fb.solve(given))
+    return {
+        "example": example,
+        "iteration": solve / belt.iterations,
+        "factorise": _least(lambda: fb.solve(given).sensitivity()) - solve,
+        "forward": _least(lambda: system.forward(supports=motion)),
+        "adjoint": _least(lambda: system.adjoint(position=weights)),
+        "jacobian": _least(lambda: system.jacobian(1)),
+    }
+
+
+def _least(action: Callable[[], object]) -> float:
+    return min(timed(action)[0] for _ in range(REPETITIONS[1]))
+
+
 # ------------------------------------------------------------------------------- meshes, batches and instructions
 
 
@@ -233,6 +283,8 @@ SECTIONS: dict[str, Callable[[], list[Record]]] = {
     "cold": cold,
     "random": random,
     "warm": warm,
+    "branches": branches,
+    "derivatives": derivatives,
     "scaling": scaling,
     "batch": batch,
     "instructions": instructions,

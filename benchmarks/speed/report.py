@@ -104,6 +104,28 @@ def warm_rows(result: Record, example: str) -> Rows:
     ]
 
 
+def branch_rows(result: Record) -> Rows:
+    """One row an energy and example."""
+    return [
+        [f"{r['example']}, `{r['energy_model']}`", str(r["updates"]), str(r["apart"]), str(r["snaps"])]
+        for r in result["branches"]
+    ]
+
+
+def derivative_rows(result: Record) -> Rows:
+    """One row an example: times, and what they are in iterations."""
+    return [
+        [
+            r["example"],
+            *(
+                f"{significant(1e6 * r[part], 2)} ({significant(r[part] / r['iteration'], 2)})"
+                for part in ("iteration", "factorise", "forward", "adjoint", "jacobian")
+            ),
+        ]
+        for r in result["derivatives"]
+    ]
+
+
 def scaling_rows(result: Record) -> Rows:
     """One row a mesh."""
     return [
@@ -152,6 +174,8 @@ COLD = [
 ]
 RANDOM = ["", "poses", "converged", "our shape", "of less energy", "of more", "p50 [ms]", "over ours"]
 WARM = ["", "updates", "failed", "iterations", "p50 [ms]", "p99", "p99.9", "p50 over ours"]
+BRANCHES = ["", "updates", "on another branch", "snaps told"]
+DERIVATIVES = ["µs (iterations)", "iteration", "factorise", "forward product", "adjoint product", "Jacobian"]
 SCALING = ["elements", "iterations", "ms an iteration", "µs an iteration and element", "memory [MB]", "kB an element"]
 BATCH = ["threads", "scenarios", "converged", "time [s]", "a second", "speed-up"]
 INSTRUCTIONS = ["", "instructions [10⁶]"]
@@ -165,6 +189,8 @@ def sections(result: Record) -> Iterator[tuple[str, list[str], Rows]]:
     yield "random", RANDOM, random_rows(result)
     for example in EXAMPLES:
         yield f"warm {example}", WARM, warm_rows(result, example)
+    yield "branches", BRANCHES, branch_rows(result)
+    yield "derivatives", DERIVATIVES, derivative_rows(result)
     yield "scaling", SCALING, scaling_rows(result)
     yield "batch", BATCH, batch_rows(result)
     yield "instructions", INSTRUCTIONS, instruction_rows(result)

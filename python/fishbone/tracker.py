@@ -25,7 +25,7 @@ class Update(NamedTuple):
     status: Status
     """Unless "converged", no equilibrium was found under the new pose, and the tracker stays where it was."""
     snapped: bool
-    """Whether the equilibrium that was followed ceased to exist, or to be stable, and this is another one."""
+    """Whether the equilibrium that was followed ceased to exist or to be stable on the way, and this is another one."""
     energy: float
     """Total potential, in the unit of the scenario."""
     iterations: int
@@ -100,7 +100,7 @@ class Tracker:
         return Reaction(np.array(force), np.array(moment))
 
     def equilibrium(self) -> Equilibrium:
-        """Everything about the present shape, solved once more from there."""
+        """Everything about the present shape."""
         scenario, found = self._inner.equilibrium()
         return Equilibrium(Scenario._wrap(scenario), found)  # noqa: SLF001 - of this package
 
@@ -109,7 +109,10 @@ class Tracker:
 
 
 def _triple(name: str, values: npt.ArrayLike) -> list[float]:
-    vector = np.asarray(values, dtype=np.float64)
+    try:
+        vector = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InvalidArgument(f"{name}: found {values!r}, allowed three numbers") from None
     if vector.shape != (3,):
         raise InvalidArgument(f"{name}: found shape {vector.shape}, allowed (3,)")
     x, y, z = vector.tolist()

@@ -64,20 +64,20 @@ impl Equilibrium {
 }
 
 /// Asks Python now and then whether a signal has arrived.
-struct Signals {
+pub(crate) struct Signals {
     asked: Instant,
-    raised: Option<PyErr>,
+    pub(crate) raised: Option<PyErr>,
 }
 
 impl Signals {
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self {
             asked: Instant::now(),
             raised: None,
         }
     }
 
-    fn proceed(&mut self) -> ControlFlow<()> {
+    pub(crate) fn proceed(&mut self) -> ControlFlow<()> {
         if self.raised.is_none() && self.asked.elapsed() >= SIGNAL_INTERVAL {
             self.asked = Instant::now();
             self.raised = Python::attach(|py| py.check_signals()).err();

@@ -1,17 +1,18 @@
 //! `_core.Tracker`.
 
 use crate::array::{self, Grid, Points, Scalars};
-use crate::equilibrium::{Equilibrium, status_name};
+use crate::equilibrium::{Equilibrium, Signals, status_name};
 use crate::scenario::Scenario;
 use fishbone::tracker::{self, NoTracker};
 use nalgebra::Vector3;
 use numpy::IntoPyArray;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// An equilibrium that is followed while one of its supports moves.
-#[pyclass(module = "fishbone._core")]
-pub(crate) struct Tracker(tracker::Tracker);
+#[pyclass(frozen, module = "fishbone._core")]
+pub(crate) struct Tracker(Mutex<tracker::Tracker>);
 
 impl Tracker {
     /// Errors: `ValueError`, one line, where there is nothing to follow.
@@ -21,72 +22,90 @@ impl Tracker {
     ) -> PyResult<Self> {
         let refused = |error: NoTracker| PyValueError::new_err(error.to_string());
         tracker::Tracker::new(equilibrium, support)
-            .map(Self)
+            .map(|tracker| Self(Mutex::new(tracker)))
             .map_err(refused)
+    }
+
+    fn lock(&self) -> MutexGuard<'_, tracker::Tracker> {
+        // An update that has panicked is not gone on with.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 #[pymethods]
 impl Tracker {
     /// (status, snapped, energy, iterations, largest residual).
+    ///
+    /// Errors: whatever a signal handler raises, `KeyboardInterrupt` first of all.
     fn update(
-        &mut self,
+        &self,
         py: Python<'_>,
         position: [f64; 3],
         rotation: [f64; 3],
-    ) -> (&'static str, bool, f64, usize, f64) {
+    ) -> PyResult<(&'static str, bool, f64, usize, f64)> {
         let [position, rotation] = [position, rotation].map(Vector3::from);
-        let update = py.detach(|| self.0.update(&position, &rotation));
-        (
-            status_name(update.status),
-            update.snapped,
-            update.energy,
-            update.iterations,
-            update.residuals.largest(),
-        )
+        let mut signals = Signals::new();
+        let update = py.detach(|| {
+            self.lock()
+                .update(&position, &rotation, &mut || signals.proceed())
+        });
+        match signals.raised {
+            Some(error) => Err(error),
+            None => Ok((
+                status_name(update.status),
+                update.snapped,
+                update.energy,
+                update.iterations,
+                update.residuals.largest(),
+            )),
+        }
     }
 
-    /// The present scenario and its equilibrium, solved anew from its own shape.
+    /// The present scenario and all that is to be known of its equilibrium.
     fn equilibrium(&self, py: Python<'_>) -> (Scenario, Equilibrium) {
         py.detach(|| {
-            let found = Equilibrium::of(|| self.0.equilibrium());
+            let found = Equilibrium::of(|| self.lock().equilibrium());
             (Scenario(found.scenario().clone()), found)
         })
     }
 
     #[getter]
     fn energy(&self) -> f64 {
-        self.0.energy()
+        self.lock().energy()
     }
 
     /// Shapes: (n, 3).
     #[getter]
     fn position<'py>(&self, py: Python<'py>) -> Points<'py> {
-        let positions: Vec<_> = self.0.positions().collect();
+        let positions: Vec<_> = self.lock().positions().collect();
         array::points(py, &positions)
     }
 
     /// Shapes: (n, 3, 3).
     #[getter]
     fn frame<'py>(&self, py: Python<'py>) -> Grid<'py> {
-        array::frames(py, self.0.frames())
+        let tracker = self.lock();
+        array::frames(py, tracker.frames())
     }
 
     /// Shapes: (n,).
     #[getter]
     fn bend<'py>(&self, py: Python<'py>) -> Scalars<'py> {
-        self.0.bends().collect::<Vec<_>>().into_pyarray(py)
+        self.lock().bends().collect::<Vec<_>>().into_pyarray(py)
     }
 
     /// Shapes: (n,).
     #[getter]
     fn rib_slope<'py>(&self, py: Python<'py>) -> Scalars<'py> {
-        self.0.rib_slopes().collect::<Vec<_>>().into_pyarray(py)
+        self.lock()
+            .rib_slopes()
+            .collect::<Vec<_>>()
+            .into_pyarray(py)
     }
 
     /// Force and moment of a support on the belt.
     fn reaction(&self, support: usize) -> ([f64; 3], [f64; 3]) {
-        let wrench = self.0.reaction(support);
+        let wrench = self.lock().reaction(support);
         (array::row(&wrench.force), array::row(&wrench.moment))
     }
 }

@@ -9,7 +9,7 @@ mod search;
 use crate::belt::Belt;
 use crate::program::{BeltPoint, BeltProgram};
 use crate::scenario::{BeltSpec, LinkSpec, Method, Scenario, SupportSpec};
-use crate::solver::{Bounds, Curvature, Residuals, Rows};
+use crate::solver::{Bounds, Curvature, Residuals, Rows, Solution};
 use crate::spine::Spine;
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -146,11 +146,23 @@ pub fn solve(scenario: &Scenario, proceed: &mut dyn FnMut() -> ControlFlow<()>) 
 }
 
 /// The same from a shape on the scenario's mesh in place of the guess.
-pub(crate) fn solve_from(scenario: &Scenario, shape: &BeltPoint) -> Equilibrium {
+pub(crate) fn solve_from(
+    scenario: &Scenario,
+    shape: &BeltPoint,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Equilibrium {
     let belt = Belt::new(&scenario.belt).expect("a validated scenario");
-    intrinsic::solve(scenario, &belt, Some(shape), &mut || {
-        ControlFlow::Continue(())
-    })
+    intrinsic::solve(scenario, &belt, Some(shape), proceed)
+}
+
+/// The equilibrium of a solution that was found by other means.
+pub(crate) fn of_solution(
+    scenario: &Scenario,
+    program: BeltProgram,
+    solution: Solution<BeltPoint>,
+) -> Equilibrium {
+    let belt = Belt::new(&scenario.belt).expect("a validated scenario");
+    intrinsic::of_solution(scenario, &belt, program, solution)
 }
 
 /// Whether the ribs of a shape are apart on the whole board.

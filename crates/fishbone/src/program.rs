@@ -19,7 +19,7 @@ use crate::element::block::{Block, LANES, Motions};
 use crate::energy::EnergyModel;
 use crate::lie::{Pose, Twist};
 use crate::solver::chain::NodeVector;
-use crate::solver::{BOUNDS, Bounds, CopyFrom, Linearisation, Program, Rows, RowsByNode, Values};
+use crate::solver::{BOUNDS, Bounds, Linearisation, Program, Rows, RowsByNode, Shape, Values};
 use crate::spine::turn;
 use crate::strip::FURTHER;
 use nalgebra::{Matrix4, Matrix6, Rotation3, UnitQuaternion, Vector2, Vector3, Vector4, Vector6};
@@ -75,10 +75,17 @@ pub struct BeltPoint {
     pub poses: Vec<Pose>,
 }
 
-impl CopyFrom for BeltPoint {
+impl Shape for BeltPoint {
     fn copy_from(&mut self, other: &Self) {
         self.fields.copy_from_slice(&other.fields);
         self.poses.copy_from_slice(&other.poses);
+    }
+
+    /// The longest way that a node is displaced, in U.
+    fn distance(&self, other: &Self) -> f64 {
+        let poses = self.poses.iter().zip(&other.poses);
+        let moves = poses.map(|(a, b)| (a.position - b.position).norm());
+        moves.fold(0.0, f64::max)
     }
 }
 

@@ -1,11 +1,12 @@
 //! Follows an equilibrium at the rate of a robot while one of its supports moves.
 
-use crate::equilibrium::{Equilibrium, Status, Units, Wrench, is_settled, solve_from};
+use crate::equilibrium::{Equilibrium, Status, Units, Wrench, is_settled, of_solution, solve_from};
 use crate::lie::{Pose, exp};
 use crate::program::{BeltPoint, BeltProgram, Piece};
 use crate::scenario::{Component, Scenario};
-use crate::solver::{Follower, Residuals};
+use crate::solver::{Followed, Follower, Residuals, Shape};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+use std::ops::ControlFlow;
 use thiserror::Error;
 
 /// Why an equilibrium cannot be followed.
@@ -23,6 +24,12 @@ pub enum NoTracker {
         "supports[{0}] does not hold a position and a rotation, all of both: nothing can be moved there"
     )]
     NotClamped(usize),
+    /// There is no such support.
+    #[error("the scenario has no supports[{0}] that could move")]
+    NoSupport(usize),
+    /// The shape may change at no cost of energy.
+    #[error("the equilibrium is no strict minimum of the energy: there is no one branch to follow")]
+    Marginal,
 }
 
 /// What became of a belt as its support moved.
@@ -30,7 +37,8 @@ pub enum NoTracker {
 pub struct Update {
     /// Whether the belt is in equilibrium under the new pose; unless converged, the tracker stays where it was.
     pub status: Status,
-    /// Whether the equilibrium that was followed ceased to exist or to be stable on the way, and this is another one.
+    /// Whether the equilibrium that was followed ceased to exist or to be stable on the way, or could not be followed, and
+    /// this is another one.
     pub snapped: bool,
     /// Total potential of the shape that the tracker has now.
     pub energy: f64,
@@ -60,11 +68,7 @@ impl Tracker {
     ///
     /// # Errors
     ///
-    /// [`NoTracker`] unless it has converged and the support holds position and rotation.
-    ///
-    /// # Panics
-    ///
-    /// If there is no such support.
+    /// [`NoTracker`] unless it has converged to a strict minimum and the support holds position and rotation.
     pub fn new(equilibrium: &Equilibrium, support: usize) -> Result<Self, NoTracker> {
         let solved = equilibrium.solved.as_ref();
         let solved = solved.ok_or(NoTracker::NoMultipliers)?;
@@ -72,7 +76,8 @@ impl Tracker {
             return Err(NoTracker::NotConverged(equilibrium.message.clone()));
         }
         let scenario = equilibrium.scenario.clone();
-        let held = &scenario.supports[support];
+        let held = scenario.supports.get(support);
+        let held = held.ok_or(NoTracker::NoSupport(support))?;
         let (Some(position), Some(frame), None) = (held.point(), held.frame(), held.hinge) else {
             return Err(NoTracker::NotClamped(support));
         };
@@ -82,7 +87,8 @@ impl Tracker {
             solved.point.clone(),
             &solved.multipliers,
             &solved.bound_multipliers,
-        );
+        )
+        .ok_or(NoTracker::Marginal)?;
         let bends = |piece: &Piece| match piece {
             Piece::Strip(element) => element.geodesic != 0.0,
             Piece::Joint { angle } => *angle != 0.0,
@@ -107,15 +113,22 @@ impl Tracker {
 
     /// Moves the support to a position and a rotation vector, world axes, and the belt with it.
     ///
-    /// Nothing is allocated where the equilibrium is followed and the board has neither links nor bends.
-    pub fn update(&mut self, position: &Vector3<f64>, rotation: &Vector3<f64>) -> Update {
+    /// Nothing is allocated where the equilibrium is followed and the board has neither links nor bends. `proceed` is asked
+    /// now and then whether to go on; `Break` leaves the tracker where it was.
+    pub fn update(
+        &mut self,
+        position: &Vector3<f64>,
+        rotation: &Vector3<f64>,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Update {
         let goal = Pose {
             frame: exp(rotation),
             position: (position - self.origin) / self.units.length,
         };
         let (from, support) = (self.pose, self.support);
         let turn = turn_between(&from.frame, &goal.frame);
-        let followed = self.follower.follow(&mut |program, share| {
+        let length = (goal.position - from.position).norm() + turn.norm();
+        let mut change = |program: &mut BeltProgram, share: f64| {
             let between = Pose {
                 position: from.position.lerp(&goal.position, share),
                 frame: match share < 1.0 {
@@ -124,57 +137,50 @@ impl Tracker {
                 },
             };
             program.move_support(support, &between);
-        });
-        if !followed.kept || !self.is_settled() {
-            return self.search(goal, position, rotation, &turn, followed.iterations);
+        };
+        let followed = self.follower.follow(length, &mut change, proceed);
+        if followed.arrived && self.is_settled() {
+            self.pose = goal;
+            return Update {
+                status: Status::Converged,
+                snapped: followed.jumped,
+                energy: self.energy(),
+                iterations: followed.iterations,
+                residuals: followed.residuals,
+            };
         }
-        self.pose = goal;
-        Update {
-            status: Status::Converged,
-            snapped: false,
-            energy: self.energy(),
-            iterations: followed.iterations,
-            residuals: followed.residuals,
-        }
-    }
-
-    /// Looks for a minimum from the last shape where that could not be followed.
-    fn search(
-        &mut self,
-        goal: Pose,
-        position: &Vector3<f64>,
-        rotation: &Vector3<f64>,
-        turn: &Vector3<f64>,
-        iterations: usize,
-    ) -> Update {
         let scenario = self.scenario_at(position, rotation);
-        let found = solve_from(&scenario, self.follower.point());
-        let moved = (goal.position - self.pose.position).norm() + turn.norm();
-        let snapped = found.status == Status::Converged && self.has_jumped(&found, moved);
-        match Self::new(&found, self.support) {
-            Ok(other) => *self = other,
-            Err(_) => self.follower.return_to_start(|program| {
-                program.move_support(self.support, &self.pose);
-            }),
-        }
-        Update {
-            status: found.status,
-            snapped,
-            energy: self.energy(),
-            iterations: iterations + found.iterations,
-            residuals: found.residuals,
-        }
+        let found = solve_from(&scenario, self.follower.point(), proceed);
+        self.take(&found, followed)
     }
 
-    /// Whether a shape is farther from the last than one that follows a support moved so far.
-    fn has_jumped(&self, found: &Equilibrium, moved: f64) -> bool {
-        const SMOOTH: f64 = 10.0;
-        const SMALL: f64 = 1e-3;
-        let now = found.spine.pose.iter().map(|pose| pose.position);
-        let before = self.positions();
-        let distances = now.zip(before).map(|(now, before)| (now - before).norm());
-        let farthest = distances.fold(0.0, f64::max) / self.units.length;
-        farthest > SMOOTH * moved + SMALL
+    /// Takes over what was found where the last equilibrium could not be followed, or reaches edges that it did not before.
+    fn take(&mut self, found: &Equilibrium, followed: Followed) -> Update {
+        /// Ribs held by another edge move the belt less.
+        const SAME: f64 = 0.01;
+        let solved = found.solved.as_ref();
+        let is_same = |shape: &BeltPoint| shape.distance(self.follower.point()) < SAME;
+        let goes_on = followed.arrived && solved.is_some_and(|solved| is_same(&solved.point));
+        let mut update = Update {
+            status: found.status,
+            snapped: found.status == Status::Converged && (followed.jumped || !goes_on),
+            energy: found.energy,
+            iterations: followed.iterations + found.iterations,
+            residuals: found.residuals,
+        };
+        match Self::new(found, self.support) {
+            Ok(other) => *self = other,
+            Err(_) => {
+                let (support, pose) = (self.support, self.pose);
+                self.follower
+                    .return_to_start(|program| program.move_support(support, &pose));
+                if update.status == Status::Converged {
+                    (update.status, update.snapped) = (Status::NotConverged, false);
+                }
+                update.energy = self.energy();
+            }
+        }
+        update
     }
 
     fn is_settled(&self) -> bool {
@@ -196,12 +202,13 @@ impl Tracker {
         scenario
     }
 
-    /// The present equilibrium, solved anew from its own shape.
-    pub fn equilibrium(&self) -> Equilibrium {
+    /// All that is to be known of the present equilibrium.
+    pub fn equilibrium(&mut self) -> Equilibrium {
         let position = self.origin + self.pose.position * self.units.length;
         let rotation = crate::lie::log(&self.pose.frame);
         let scenario = self.scenario_at(&position, &rotation);
-        solve_from(&scenario, self.follower.point())
+        let solution = self.follower.solution();
+        of_solution(&scenario, self.follower.program().clone(), solution)
     }
 
     /// Number of nodes.

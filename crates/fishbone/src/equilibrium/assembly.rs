@@ -15,7 +15,7 @@ use std::f64::consts::PI;
 pub(super) struct Assembly<'a> {
     scenario: &'a Scenario,
     belt: &'a Belt,
-    units: Units,
+    pub(super) units: Units,
     /// Where the programme has its origin, so that a belt far from the world's loses no digits: at the first support.
     pub(super) origin: Vector3<f64>,
 }

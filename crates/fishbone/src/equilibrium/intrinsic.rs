@@ -29,7 +29,6 @@ pub(super) fn solve(
     from: Option<&BeltPoint>,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Equilibrium {
-    let units = Units::of(belt);
     let assembly = Assembly::new(scenario, belt);
     let (Found { program, solution }, status, message, twice) = match excess_distance(scenario) {
         Some(message) => {
@@ -43,6 +42,34 @@ pub(super) fn solve(
             (found, status, message, twice)
         }
     };
+    let found = Found { program, solution };
+    equilibrium(scenario, &assembly, found, status, message, twice)
+}
+
+/// The equilibrium of a solution that was found by other means, where its ribs are apart.
+pub(super) fn of_solution(
+    scenario: &Scenario,
+    belt: &Belt,
+    program: BeltProgram,
+    solution: Solution<BeltPoint>,
+) -> Equilibrium {
+    let assembly = Assembly::new(scenario, belt);
+    let twice = said_twice(scenario, &program);
+    let (status, message) = judge(scenario, &solution, None, twice.as_deref());
+    let found = Found { program, solution };
+    equilibrium(scenario, &assembly, found, status, message, twice)
+}
+
+/// All that is to be known of where a search ended.
+fn equilibrium(
+    scenario: &Scenario,
+    assembly: &Assembly,
+    Found { program, solution }: Found,
+    status: Status,
+    message: String,
+    twice: Option<String>,
+) -> Equilibrium {
+    let units = assembly.units;
     let stable = stable(status, solution.curvature);
     let spine = assembly.spine(&program, &solution.point);
     let half_turns = match status {

@@ -1,8 +1,11 @@
-//! Follows a minimum while its programme changes: predicts by the last factorisation, corrects by Newton's method, and
-//! never takes a step that might lead to another minimum.
+//! Follows a minimum while its programme changes: predicts by the last factorisation, corrects by Newton's method, takes no
+//! step that might lead to another minimum, and tells where there is no more to follow.
 
-use super::interior_point::State;
-use super::{Bounds, Program, Residuals, Rows, RowsByNode, Settings, Values};
+use super::interior_point::{State, minimise};
+use super::{
+    Bounds, Curvature, Outcome, Program, Residuals, Rows, RowsByNode, Settings, Solution, Values,
+};
+use std::ops::ControlFlow;
 
 /// How a minimum was followed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -11,8 +14,10 @@ pub struct Followed {
     pub iterations: usize,
     /// Residuals where it ended.
     pub residuals: Residuals,
-    /// Whether it is the minimum that was followed, and all residuals are within the tolerance.
-    pub kept: bool,
+    /// Whether the minimum ceased to be one on the way, and this is another.
+    pub jumped: bool,
+    /// Whether the end of the way was reached; if not, the minimum is the last that was found.
+    pub arrived: bool,
 }
 
 /// A minimum, and all that it takes to follow it: nothing is allocated on the way but for links.
@@ -34,7 +39,7 @@ struct Minimum<P> {
     bound_multipliers: Bounds,
 }
 
-impl<P: CopyFrom> CopyFrom for Minimum<P> {
+impl<P: Shape> Minimum<P> {
     fn copy_from(&mut self, other: &Self) {
         self.point.copy_from(&other.point);
         self.multipliers.copy_from_slice(&other.multipliers);
@@ -48,50 +53,49 @@ struct Way {
     done: f64,
     stride: f64,
     iterations: usize,
+    leaps: usize,
+    jumped: bool,
 }
 
 impl<P: Program> Follower<P>
 where
-    P::Point: CopyFrom,
+    P::Point: Shape,
 {
-    /// Starts at a minimum.
-    ///
-    /// # Panics
-    ///
-    /// If the point is outside the programme's domain.
+    /// Starts at a minimum; `None` where it is none that can be followed.
     pub fn new(
         program: P,
         tolerance: f64,
         point: P::Point,
         multipliers: &[Rows],
         bound_multipliers: &Bounds,
-    ) -> Self {
+    ) -> Option<Self> {
         let settings = Settings {
             tolerance,
             iterations: 0,
             barrier: 0.0,
         };
+        let minimum = Minimum {
+            point: point.clone(),
+            multipliers: multipliers.to_vec(),
+            bound_multipliers: bound_multipliers.clone(),
+        };
         let mut state = State::new(program, settings, point);
         // Half of what complementarity may be: the higher, the farther a Newton step is good for.
         let heaviest = state.weights.iter().fold(0.0, |most: f64, w| most.max(*w));
         state.barrier = 0.5 * tolerance / heaviest;
-        state.multipliers.copy_from_slice(multipliers);
-        state.bound_multipliers.copy_from_slice(bound_multipliers);
-        state.linearise();
-        let minimum = Minimum {
-            point: state.point.clone(),
-            multipliers: multipliers.to_vec(),
-            bound_multipliers: bound_multipliers.clone(),
-        };
         let mut follower = Self {
             first: minimum.clone(),
-            last: minimum,
             jacobians: state.linear.constraints.clone(),
             state,
+            last: minimum.clone(),
         };
-        follower.correct(f64::INFINITY);
+        let started = follower.start_from(
+            &minimum.point,
+            &minimum.multipliers,
+            &minimum.bound_multipliers,
+        );
         follower.keep();
-        follower
+        started.then_some(follower)
     }
 
     /// The programme as it is now.
@@ -119,28 +123,43 @@ where
         &self.state.bound_multipliers
     }
 
-    /// Follows the minimum while `change` takes the programme from where it is, at 0, to where it should be, at 1: in one
-    /// stride, or where that might lose it in shorter ones. Where it cannot be followed, it stays the last that was found
-    /// and the programme is that at 1.
-    pub fn follow(&mut self, change: &mut dyn FnMut(&mut P, f64)) -> Followed {
-        const SHORTEST: f64 = 1e-3;
+    /// Follows the minimum while `change` takes the programme from where it is, at 0, to where it should be, at 1, which is
+    /// `length` away: in one stride, or where that might lose it in shorter ones. Where it ends it gives way to the next
+    /// minimum downhill, and that is followed on. The programme ends at 1.
+    ///
+    /// `proceed` is asked once a stride whether to go on.
+    pub fn follow(
+        &mut self,
+        length: f64,
+        change: &mut dyn FnMut(&mut P, f64),
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Followed {
+        const SHORTEST: f64 = 1e-4;
+        const MOST_LEAPS: usize = 20;
         let mut way = Way {
             done: 0.0,
             stride: 1.0,
             iterations: 0,
+            leaps: 0,
+            jumped: false,
         };
         self.first.copy_from(&self.last);
-        while way.done < 1.0 && way.stride >= SHORTEST {
+        while way.done < 1.0 && way.leaps < MOST_LEAPS && proceed().is_continue() {
             let next = (way.done + way.stride).min(1.0);
             change(&mut self.state.program, next);
             let (iterations, kept) = self.stride();
             way.iterations += iterations;
-            if kept {
+            let arrived = kept || {
+                self.go_back();
+                way.stride <= SHORTEST && self.leap(length, next, &mut way, proceed)
+            };
+            if arrived {
                 self.keep();
                 way.done = next;
                 way.stride *= 2.0;
+            } else if way.stride <= SHORTEST {
+                break;
             } else {
-                self.go_back();
                 way.stride *= 0.25;
             }
         }
@@ -148,8 +167,84 @@ where
         Followed {
             iterations: way.iterations,
             residuals: self.state.residuals(),
-            kept: way.done >= 1.0,
+            jumped: way.jumped,
+            arrived: way.done >= 1.0,
         }
+    }
+
+    /// Goes downhill from the last minimum where the shortest stride has lost it; false where that leads nowhere.
+    fn leap(
+        &mut self,
+        length: f64,
+        next: f64,
+        way: &mut Way,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> bool {
+        /// As near to the minimum that was lost as a step may begin.
+        const NEAR: f64 = 1e-5;
+        const ITERATIONS: usize = 300;
+        /// A smooth way leads no farther than so many times its length. Less than the other is how far it goes where an
+        /// inequality passes from one stage to the next, which is the mesh's doing.
+        const SMOOTH: f64 = 100.0;
+        const OF_THE_MESH: f64 = 2e-3;
+        way.leaps += 1;
+        let settings = Settings {
+            iterations: ITERATIONS,
+            barrier: NEAR,
+            ..self.state.settings
+        };
+        let found = minimise(
+            &self.state.program,
+            &settings,
+            self.last.point.clone(),
+            proceed,
+        );
+        way.iterations += found.iterations;
+        if found.outcome != Outcome::Converged || found.curvature == Curvature::Negative {
+            return false;
+        }
+        let moved = length * (next - way.done);
+        way.jumped |= found.point.distance(&self.last.point) > SMOOTH * moved + OF_THE_MESH;
+        self.start_from(&found.point, &found.multipliers, &found.bound_multipliers)
+    }
+
+    /// Takes over a minimum; false where it is none that can be followed.
+    fn start_from(
+        &mut self,
+        point: &P::Point,
+        multipliers: &[Rows],
+        bound_multipliers: &Bounds,
+    ) -> bool {
+        let state = &mut self.state;
+        state.point.copy_from(point);
+        state.multipliers.copy_from_slice(multipliers);
+        state.bound_multipliers.copy_from_slice(bound_multipliers);
+        let admissible = state.program.evaluate(&mut state.point, &mut state.values);
+        state.linearise();
+        let (_, kept) = self.correct(f64::INFINITY);
+        admissible && kept
+    }
+
+    /// The minimum where it is now.
+    pub fn solution(&mut self) -> Solution<P::Point> {
+        let residuals = self.state.residuals();
+        let state = &mut self.state;
+        let curvature =
+            state
+                .newton
+                .curvature(&state.linear, &state.values, &state.bound_multipliers);
+        let solution = Solution {
+            point: state.point.clone(),
+            values: state.values.clone(),
+            multipliers: state.multipliers.clone(),
+            bound_multipliers: state.bound_multipliers.clone(),
+            residuals,
+            iterations: 0,
+            outcome: Outcome::Converged,
+            curvature,
+        };
+        self.factorise();
+        solution
     }
 
     /// Goes back to where the last way began, and so does the programme.
@@ -252,10 +347,13 @@ where
     }
 }
 
-/// A point that takes over another without allocating.
-pub trait CopyFrom {
-    /// Takes over the other, of the same size.
+/// A point that can be kept and compared.
+pub trait Shape: Clone {
+    /// Takes over another of the same size, without allocating.
     fn copy_from(&mut self, other: &Self);
+
+    /// How far apart two are, in the unit in which a way is measured.
+    fn distance(&self, other: &Self) -> f64;
 }
 
 /// Length of the present step.

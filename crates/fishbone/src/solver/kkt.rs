@@ -7,8 +7,8 @@ use nalgebra::{SVector, Vector2, Vector4};
 
 /// Most times that the solution of the system is improved by what it misses.
 const REFINEMENTS: usize = 20;
-/// Share of the solution below which an improvement is the last.
-const ENOUGH: f64 = 1e-12;
+/// Share of the solution below which an improvement is not worth it.
+const ENOUGH: f64 = 1e-16;
 /// Share of the right-hand side below which what answers to it is rounding.
 const NOTHING: f64 = 1e-8;
 /// Share of the solution above which what is missed is more than rounding.
@@ -115,8 +115,10 @@ impl Kkt {
             missed = self.missed(right, &found);
             let share = largest(&self.newton.step) / size(&found.nodes);
             let no_better = share >= last;
+            // Every improvement is by about the same factor.
+            let next = share * share / last.min(1.0);
             last = share;
-            if share <= ENOUGH || no_better {
+            if next <= ENOUGH || no_better {
                 break;
             }
         }

@@ -14,7 +14,7 @@ mod kkt;
 mod newton;
 mod rank;
 
-pub use follow::{CopyFrom, Followed, Follower};
+pub use follow::{Followed, Follower, Shape};
 pub use interior_point::minimise;
 pub use kkt::{Kkt, KktVector, Singular};
 pub use rank::dependent_constraints;
