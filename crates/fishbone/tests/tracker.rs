@@ -1,0 +1,94 @@
+//! Following an equilibrium from Rust: what it costs, and where it leads.
+
+use fishbone::equilibrium::{Equilibrium, Status, solve};
+use fishbone::scenario::Scenario;
+use fishbone::tracker::{NoTracker, Tracker, Update};
+use nalgebra::Vector3;
+use std::ops::ControlFlow;
+
+fn solved(toml: &str) -> Equilibrium {
+    let scenario = Scenario::from_toml(toml).unwrap();
+    solve(&scenario, &mut || ControlFlow::Continue(()))
+}
+
+/// A straight belt with its end at (0, y, 0.1).
+fn clamped(y: f64) -> String {
+    format!(
+        "belt = {{ width = 0.1, rigidity = 2.0, segments = [{{ kind = 'straight', length = 1.0 }}] }}
+         supports = [
+           {{ at = 'start', position = [0, 0, 0], rotation = [0, 0, 0] }},
+           {{ at = 'end', position = [0, {y}, 0.1], rotation = [0, 0, 0] }},
+         ]"
+    )
+}
+
+fn update(tracker: &mut Tracker, y: f64, angle: f64) -> Update {
+    let (position, rotation) = (Vector3::new(0.0, y, 0.1), Vector3::new(0.0, 0.0, angle));
+    tracker.update(&position, &rotation, &mut || ControlFlow::Continue(()))
+}
+
+#[test]
+fn test_update_ends_in_the_equilibrium_of_its_pose() {
+    let mut tracker = Tracker::new(&solved(&clamped(0.5)), 1).unwrap();
+    for step in 1..=20 {
+        let y = 0.5 + 0.005 * f64::from(step);
+        let followed = update(&mut tracker, y, 0.0);
+        assert_eq!(
+            (followed.status, followed.snapped),
+            (Status::Converged, false)
+        );
+    }
+    let afresh = solved(&clamped(0.6));
+    assert!((tracker.energy() / afresh.energy - 1.0).abs() < 1e-6);
+    let apart = tracker.reaction(1).force - afresh.reactions[1].wrench.force;
+    assert!(apart.norm() < 1e-4 * afresh.reactions[1].wrench.force.norm());
+    let made_of_it = tracker.equilibrium();
+    assert!((made_of_it.energy - tracker.energy()).abs() < 1e-12 * tracker.energy());
+    assert_eq!(made_of_it.stable, Some(true));
+}
+
+#[test]
+fn test_update_allocates_nothing_after_the_first() {
+    let mut tracker = Tracker::new(&solved(&clamped(0.5)), 1).unwrap();
+    update(&mut tracker, 0.501, 0.001);
+    let allocated = allocation_counter::measure(|| {
+        for step in 2..100 {
+            let share = f64::from(step) * 1e-3;
+            let followed = update(&mut tracker, 0.5 + share, share);
+            assert_eq!(followed.status, Status::Converged);
+        }
+    });
+    assert_eq!(allocated.count_total, 0);
+}
+
+#[test]
+fn test_interrupted_update_leaves_the_tracker_where_it_was() {
+    let mut tracker = Tracker::new(&solved(&clamped(0.5)), 1).unwrap();
+    let energy = tracker.energy();
+    let far = Vector3::new(0.2, 0.3, -0.2);
+    let ended = tracker.update(&far, &Vector3::new(1.0, 2.0, 0.5), &mut || {
+        ControlFlow::Break(())
+    });
+    assert_eq!(ended.status, Status::NotConverged);
+    assert!((tracker.energy() / energy - 1.0).abs() < 1e-12);
+    assert_eq!(update(&mut tracker, 0.5, 0.0).status, Status::Converged);
+}
+
+#[test]
+fn test_what_cannot_be_followed_is_refused() {
+    let equilibrium = solved(&clamped(0.5));
+    assert_eq!(
+        Tracker::new(&equilibrium, 7).err(),
+        Some(NoTracker::NoSupport(7))
+    );
+    let out_of_reach = Tracker::new(&solved(&clamped(1.5)), 1);
+    assert!(matches!(
+        out_of_reach.err(),
+        Some(NoTracker::NotConverged(_))
+    ));
+    let pinned = clamped(0.5).replace(", 0.1], rotation = [0, 0, 0] }", ", 0.1] }");
+    assert_eq!(
+        Tracker::new(&solved(&pinned), 1).err(),
+        Some(NoTracker::NotClamped(1))
+    );
+}
