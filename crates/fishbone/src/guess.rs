@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector2, Vector3};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Samples of the arch when its reach is measured.
-const SAMPLES: usize = 64;
+const SAMPLES: usize = 24;
 /// What a miss by the whole length counts for when arches are compared, as ∫ω_ζ² du: a tenth of it as much as a turn.
 const MISS: f64 = 10.0 * TAU * TAU;
 /// What bulging straight to the side asked for counts for.
