@@ -95,7 +95,8 @@ impl Tracker {
             Piece::Rigid { .. } => false,
         };
         let (units, origin) = (solved.units, solved.origin);
-        let stored = follower.values().objective * units.energy;
+        let (program, point) = (&solved.program, &solved.point);
+        let stored = program.elastic_energy(&point.fields) + program.load_potential(&point.poses);
         Ok(Self {
             support,
             pose: Pose {
@@ -103,7 +104,7 @@ impl Tracker {
                 position: (position - origin) / units.length,
             },
             has_bends: solved.program.pieces.iter().any(bends),
-            potential_of_origin: equilibrium.energy - stored,
+            potential_of_origin: equilibrium.energy - stored * units.energy,
             scenario,
             follower,
             units,
@@ -209,11 +210,6 @@ impl Tracker {
         let scenario = self.scenario_at(&position, &rotation);
         let solution = self.follower.solution();
         of_solution(&scenario, self.follower.program().clone(), solution)
-    }
-
-    /// Number of nodes.
-    pub fn nodes(&self) -> usize {
-        self.point().poses.len()
     }
 
     fn point(&self) -> &BeltPoint {

@@ -118,11 +118,6 @@ where
         &self.state.multipliers
     }
 
-    /// Multipliers of its inequalities.
-    pub fn bound_multipliers(&self) -> &Bounds {
-        &self.state.bound_multipliers
-    }
-
     /// Follows the minimum while `change` takes the programme from where it is, at 0, to where it should be, at 1, which is
     /// `length` away: in one stride, or where that might lose it in shorter ones. Where it ends it gives way to the next
     /// minimum downhill, and that is followed on. The programme ends at 1.
