@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 
 from fishbone import _core
-from fishbone.errors import InvalidArgument, NoSensitivity, NoSupport, NotConverged
+from fishbone.errors import InvalidArgument, NoModes, NoSensitivity, NoSupport, NotConverged
 from fishbone.sensitivity import Sensitivity
 
 if TYPE_CHECKING:
@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 
 MIN_ACROSS, MAX_ACROSS = 2, 10_001
 """Ribs are straight: two points hold all there is to a rib, and more are for rendering."""
+
+MAX_MODES = 100
+"""More than what a mesh resolves."""
 
 Status = Literal["converged", "infeasible", "not_converged"]
 
@@ -79,6 +82,25 @@ class Residuals(NamedTuple):
     stationarity: float
     constraint: float
     complementarity: float
+
+
+class Mode(NamedTuple):
+    """A motion from an equilibrium that the second variation of the energy does not couple with other modes.
+
+    Its scale is such that the mean over the board of the squared displacement is 1, the board taken as a strip across the
+    spine that turns with the frame, all of it weighing alike. n is the number of nodes.
+    """
+
+    eigenvalue: float
+    """Second variation of the energy: twice what it rises by, per squared displacement."""
+    translation: Floats
+    """Displacement of the spine, shape (n, 3)."""
+    rotation: Floats
+    """Rotation of the frame, left, in world axes, shape (n, 3)."""
+    bend: Floats
+    """Change of the bend ω_ζ, shape (n,)."""
+    rib_slope: Floats
+    """Change of the rib slope β, shape (n,)."""
 
 
 class HighestPoint(NamedTuple):
@@ -163,8 +185,35 @@ class Equilibrium:
 
     @property
     def stable(self) -> bool | None:
-        """Whether the equilibrium is a local minimum; None where that is not known."""
+        """Whether the equilibrium is a local minimum; None where that cannot be decided.
+
+        So it is where it has a mode of no second variation, and where a part of the belt is flat under stress: there any
+        slope of the ribs is as good as any other, and along which of them the belt would give way is not seen.
+        """
         return self._inner.stable
+
+    @property
+    def negative_modes(self) -> int | None:
+        """Number of independent motions, of those that supports and touching ribs leave, along which the energy falls."""
+        return self._inner.negative_modes
+
+    @property
+    def zero_modes(self) -> int | None:
+        """Number of independent motions along which the energy stays, to second order."""
+        return self._inner.zero_modes
+
+    def modes(self, count: int) -> list[Mode]:
+        """The lowest modes, rising: fewer where the mesh has no more.
+
+        Errors: `NoModes` unless the solve has converged by the intrinsic method; `InvalidArgument` where `count` is below
+        1.
+        """
+        if not 1 <= count <= MAX_MODES:
+            raise InvalidArgument(f"count: found {count}, allowed 1 to {MAX_MODES}")
+        try:
+            return [Mode(*mode) for mode in self._inner.modes(count)]
+        except ValueError as error:
+            raise NoModes(str(error)) from None
 
     @property
     def iterations(self) -> int:

@@ -28,6 +28,10 @@ class NoSensitivity(FishboneError):  # noqa: N818
     """A shape has no derivatives: it is no equilibrium, no minimum, or not determined by its supports."""
 
 
+class NoModes(FishboneError):  # noqa: N818
+    """A shape has no modes of its own: it is no equilibrium."""
+
+
 class NoTracker(FishboneError):  # noqa: N818
     """There is no equilibrium to follow, or nothing to move it by."""
 

@@ -9,6 +9,7 @@ use fishbone::spine::Piece;
 use fishbone::surface::{self, Curve, Rib};
 use nalgebra::{Vector2, Vector3};
 use numpy::IntoPyArray;
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
@@ -89,6 +90,9 @@ impl Signals {
     }
 }
 
+/// Eigenvalue, translation, rotation, bend and rib slope.
+type Mode<'py> = (f64, Points<'py>, Points<'py>, Scalars<'py>, Scalars<'py>);
+
 /// The outcome of a solve.
 #[pyclass(frozen, module = "fishbone._core")]
 pub(crate) struct Equilibrium {
@@ -136,7 +140,17 @@ impl Equilibrium {
 
     #[getter]
     fn stable(&self) -> Option<bool> {
-        self.solved.stable
+        self.solved.stable()
+    }
+
+    #[getter]
+    fn negative_modes(&self) -> Option<usize> {
+        Some(self.solved.stability?.negative_modes)
+    }
+
+    #[getter]
+    fn zero_modes(&self) -> Option<usize> {
+        Some(self.solved.stability?.zero_modes)
     }
 
     #[getter]
@@ -381,6 +395,25 @@ impl Equilibrium {
             .filter(|(_, piece)| matches!(piece, Piece::Rigid))
             .map(|(element, _)| (spine.u[element], spine.u[element + 1]))
             .collect()
+    }
+
+    /// (eigenvalue, translation, rotation, bend, rib slope) of the lowest modes, found with the GIL released.
+    ///
+    /// Shapes: (n, 3), (n, 3), (n,), (n,).
+    /// Errors: `ValueError`, one line, where it has none.
+    fn modes<'py>(&self, py: Python<'py>, count: usize) -> PyResult<Vec<Mode<'py>>> {
+        let modes = py.detach(|| self.solved.modes(count));
+        let modes = modes.map_err(|error| PyValueError::new_err(error.to_string()))?;
+        let mode = |mode: fishbone::stability::Mode| {
+            (
+                mode.eigenvalue,
+                array::points(py, mode.motion.iter().map(|motion| &motion.translation)),
+                array::points(py, mode.motion.iter().map(|motion| &motion.rotation)),
+                mode.bend.into_pyarray(py),
+                mode.rib_slope.into_pyarray(py),
+            )
+        };
+        Ok(modes.into_iter().map(mode).collect())
     }
 
     /// Follows it while a support moves.

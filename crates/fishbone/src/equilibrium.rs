@@ -9,8 +9,9 @@ mod search;
 use crate::belt::Belt;
 use crate::program::{BeltPoint, BeltProgram};
 use crate::scenario::{BeltSpec, LinkSpec, Method, Scenario, SupportSpec};
-use crate::solver::{Bounds, Curvature, Residuals, Rows, Solution};
+use crate::solver::{Bounds, Inertia, Residuals, Rows, Solution};
 use crate::spine::Spine;
+use crate::stability::Stability;
 use nalgebra::Vector3;
 use serde::Serialize;
 use std::ops::ControlFlow;
@@ -80,8 +81,8 @@ pub struct Equilibrium {
     pub links: Vec<LinkForce>,
     /// Signed half turns of a closed belt as it ended, `None` of an open one.
     pub half_turns: Option<i32>,
-    /// Whether the equilibrium is a local minimum, where known.
-    pub stable: Option<bool>,
+    /// The second variation, where it can be decided.
+    pub stability: Option<Stability>,
     /// How far the shape is from a solution of its discrete equations, lengths in U and energy in mean R_f/U.
     pub residuals: Residuals,
     /// Iterations, over all attempts.
@@ -97,7 +98,7 @@ pub(crate) struct Solved {
     pub(crate) point: BeltPoint,
     pub(crate) multipliers: Vec<Rows>,
     pub(crate) bound_multipliers: Bounds,
-    pub(crate) curvature: Curvature,
+    pub(crate) inertia: Option<Inertia>,
     pub(crate) units: Units,
     /// Where the programme has its origin.
     pub(crate) origin: Vector3<f64>,

@@ -43,6 +43,7 @@ pub mod scenario;
 pub mod sensitivity;
 pub mod solver;
 pub mod spine;
+pub mod stability;
 pub mod strip;
 pub mod surface;
 pub mod tracker;

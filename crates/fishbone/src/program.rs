@@ -17,12 +17,15 @@ pub use support::{Hold, NodeSupport};
 use crate::element::Element;
 use crate::element::block::{Block, LANES, Motions};
 use crate::energy::EnergyModel;
-use crate::lie::{Pose, Twist};
+use crate::lie::{Pose, Twist, hat};
 use crate::solver::chain::NodeVector;
 use crate::solver::{BOUNDS, Bounds, Linearisation, Program, Rows, RowsByNode, Shape, Values};
 use crate::spine::turn;
 use crate::strip::FURTHER;
-use nalgebra::{Matrix4, Matrix6, Rotation3, UnitQuaternion, Vector2, Vector3, Vector4, Vector6};
+use nalgebra::{
+    Matrix3, Matrix3x6, Matrix4, Matrix6, Rotation3, UnitQuaternion, Vector2, Vector3, Vector4,
+    Vector6,
+};
 
 /// What joins a node to the next.
 #[expect(
@@ -557,6 +560,30 @@ impl Program for BeltProgram {
         let twist = Twist::from_vector(&(length * step[0].fixed_rows::<6>(0)));
         into.poses[0] = Pose::exp(&twist) * point.poses[0];
     }
+
+    /// The mean square over the board of how far it moves, in U², all of it weighing alike: a node carries half of both
+    /// pieces beside it, as a strip across the spine that turns with the frame.
+    fn metric(&self, point: &BeltPoint) -> Vec<Matrix6<f64>> {
+        let half_width = self.elements().map(|(_, element)| element.half_width);
+        let across = half_width.fold(0.0, f64::max).powi(2) / 3.0;
+        let length = |k: Option<usize>| {
+            k.and_then(|k| self.pieces.get(k))
+                .map_or(0.0, Piece::length)
+        };
+        let of_node = |(k, pose): (usize, &Pose)| {
+            let share = 0.5 * (length(k.checked_sub(1)) + length(Some(k)));
+            let mut moved = Matrix3x6::identity();
+            moved
+                .fixed_columns_mut::<3>(3)
+                .copy_from(&-hat(&pose.position));
+            let mut metric = moved.tr_mul(&moved);
+            let along_rib = pose.frame.column(2);
+            let mut turns = metric.fixed_view_mut::<3, 3>(3, 3);
+            turns += across * (Matrix3::identity() - along_rib * along_rib.transpose());
+            share * metric
+        };
+        point.poses.iter().enumerate().map(of_node).collect()
+    }
 }
 
 impl BeltProgram {
@@ -661,7 +688,7 @@ impl BeltProgram {
         for (link, rows) in self.links.iter().zip(&mut into.links) {
             *rows = link.jacobian(point);
         }
-        let states = &mut into.chain.states;
+        let states = &mut into.diagonal.states;
         states.clear();
         if self.is_loaded() || !self.links.is_empty() {
             states.resize(point.poses.len(), Matrix6::zeros());

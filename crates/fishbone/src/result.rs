@@ -167,9 +167,9 @@ impl<'a> Record<'a> {
             },
             half_turns: equilibrium.half_turns,
             twist: spine.twist(),
-            stable: equilibrium.stable,
-            negative_modes: (equilibrium.stable == Some(true)).then_some(0),
-            zero_modes: (equilibrium.stable == Some(true)).then_some(0),
+            stable: equilibrium.stable(),
+            negative_modes: equilibrium.stability.map(|s| s.negative_modes),
+            zero_modes: equilibrium.stability.map(|s| s.zero_modes),
             residuals: Residuals {
                 stationarity: equilibrium.residuals.stationarity,
                 constraint: equilibrium.residuals.constraint,

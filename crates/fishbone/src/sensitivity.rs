@@ -10,7 +10,7 @@ mod scales;
 mod system;
 
 use crate::equilibrium::{Equilibrium, Status, Wrench};
-use crate::solver::{Curvature, Kkt, KktVector, Singular};
+use crate::solver::{Kkt, KktVector, Singular};
 use nalgebra::{Matrix3x6, Vector3};
 use scales::Scales;
 use system::{Direction, System};
@@ -115,7 +115,7 @@ impl Equilibrium {
         if let Some(names) = &solved.said_twice {
             return Err(NoSensitivity::HeldTwice(names.clone()));
         }
-        if solved.curvature == Curvature::Negative {
+        if solved.inertia.is_some_and(|inertia| inertia.negative > 0) {
             return Err(NoSensitivity::Saddle);
         }
         if solved.is_flat {
@@ -133,7 +133,8 @@ impl Equilibrium {
             scales: Scales::new(&self.scenario, solved),
             nodes: solved.point.poses.len(),
         };
-        match solved.curvature == Curvature::Positive || sensitivity.is_held() {
+        let is_strict = solved.inertia.is_some_and(|inertia| inertia.zero == 0);
+        match is_strict || sensitivity.is_held() {
             true => Ok(sensitivity),
             false => Err(NoSensitivity::Marginal),
         }

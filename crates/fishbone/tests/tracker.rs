@@ -44,7 +44,7 @@ fn test_update_ends_in_the_equilibrium_of_its_pose() {
     assert!(apart.norm() < 1e-4 * afresh.reactions[1].wrench.force.norm());
     let made_of_it = tracker.equilibrium();
     assert!((made_of_it.energy - tracker.energy()).abs() < 1e-12 * tracker.energy());
-    assert_eq!(made_of_it.stable, Some(true));
+    assert_eq!(made_of_it.stable(), Some(true));
 }
 
 #[test]

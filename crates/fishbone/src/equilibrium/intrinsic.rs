@@ -12,7 +12,8 @@ use crate::guess::{disturb, guess};
 use crate::linking::half_turns;
 use crate::program::{self, BeltPoint, BeltProgram};
 use crate::scenario::{Scenario, SupportSpec};
-use crate::solver::{Curvature, Outcome, Solution, dependent_constraints};
+use crate::solver::{Inertia, Outcome, Solution, dependent_constraints};
+use crate::stability::Stability;
 use nalgebra::Vector3;
 use std::ops::ControlFlow;
 
@@ -70,20 +71,20 @@ fn equilibrium(
     twice: Option<String>,
 ) -> Equilibrium {
     let units = assembly.units;
-    let stable = stable(status, solution.curvature);
     let spine = assembly.spine(&program, &solution.point);
     let half_turns = match status {
         Status::Converged => half_turns(&spine),
         Status::Infeasible | Status::NotConverged => None,
     };
     let internal = program.internal(&solution.point, &solution.multipliers);
+    let stability = stability(status, solution.inertia, &internal);
     let links = program.link_forces(&solution.multipliers).into_iter();
     let is_flat = is_flat_under_load(&program, &solution.point);
     Equilibrium {
         status,
         message,
         warnings: [
-            warnings(scenario, &program, status, stable, is_flat),
+            warnings(scenario, &program, status, stability, is_flat),
             doubts(status, twice.as_deref()),
             passed_through_itself(scenario, half_turns),
         ]
@@ -101,7 +102,7 @@ fn equilibrium(
                 force: force * units.force(),
             })
             .collect(),
-        stable,
+        stability,
         residuals: solution.residuals,
         iterations: solution.iterations,
         scenario: scenario.clone(),
@@ -110,7 +111,7 @@ fn equilibrium(
             point: solution.point,
             multipliers: solution.multipliers,
             bound_multipliers: solution.bound_multipliers,
-            curvature: solution.curvature,
+            inertia: solution.inertia,
             units,
             origin: assembly.origin,
             said_twice: twice,
@@ -292,7 +293,7 @@ fn warnings(
     scenario: &Scenario,
     program: &BeltProgram,
     status: Status,
-    stable: Option<bool>,
+    stability: Option<Stability>,
     is_flat: bool,
 ) -> Vec<String> {
     // Strong twist makes facets of the scale of V, which longer elements cannot resolve.
@@ -309,7 +310,7 @@ fn warnings(
         && scenario.belt.density_value() == 0.0;
     let thick = scenario.belt.thickness();
     let thick = thick.filter(|thickness| *thickness > THICK * scenario.belt.width);
-    let saddle = stable == Some(false);
+    let saddle = stability.and_then(|s| s.is_stable()) == Some(false);
     let turned = scenario
         .supports
         .iter()
@@ -357,12 +358,22 @@ fn more_than_a_turn((i, support): (usize, &SupportSpec)) -> Option<String> {
     })
 }
 
-fn stable(status: Status, curvature: Curvature) -> Option<bool> {
-    match (status, curvature) {
-        (Status::Converged, Curvature::Positive) => Some(true),
-        (Status::Converged, Curvature::Negative) => Some(false),
-        _ => None,
-    }
+/// Where a part of the belt is flat, any slope of its ribs is as good as any other; under stress, which of them the belt may
+/// give way along is not seen in the second variation with these held, unless it is negative already.
+fn stability(
+    status: Status,
+    inertia: Option<Inertia>,
+    internal: &[(Vector3<f64>, Vector3<f64>)],
+) -> Option<Stability> {
+    const UNSTRESSED: f64 = 1e-6;
+    let inertia = inertia.filter(|_| status == Status::Converged)?;
+    let stress = |(force, moment): &(Vector3<f64>, Vector3<f64>)| force.amax().max(moment.amax());
+    let is_stressed = internal.iter().any(|wrench| stress(wrench) > UNSTRESSED);
+    let is_open = inertia.idle > 0 && is_stressed && inertia.negative == 0;
+    (!is_open).then_some(Stability {
+        negative_modes: inertia.negative,
+        zero_modes: inertia.zero,
+    })
 }
 
 fn reactions(

@@ -96,7 +96,7 @@ fn report(scenario: &Scenario, belt: &Belt, start: &Pose, solution: &Solution) -
         reactions: Vec::new(),
         links: Vec::new(),
         half_turns: None,
-        stable: None,
+        stability: None,
         residuals: Residuals {
             stationarity: solution.stationarity,
             constraint: solution.violation_along.max(),

@@ -4,7 +4,7 @@ use crate::energy::EnergyModel;
 use crate::guess::{buckle, disturb, guess, inside, is_flat, ring};
 use crate::program::{BeltPoint, BeltProgram, Piece};
 use crate::scenario::SAME_PLACE;
-use crate::solver::{self, Curvature, Outcome, Settings, Solution};
+use crate::solver::{self, Outcome, Settings, Solution};
 use nalgebra::{Vector2, Vector3};
 use std::f64::consts::PI;
 use std::ops::ControlFlow;
@@ -218,9 +218,9 @@ fn better(
 
 /// The better of two ends has the higher rank: a minimum, another equilibrium, anything else.
 fn rank(solution: &Solution<BeltPoint>) -> u8 {
-    match (solution.outcome, solution.curvature) {
-        (Outcome::Converged, Curvature::Positive | Curvature::Marginal) => 2,
-        (Outcome::Converged, Curvature::Negative) => 1,
+    match solution.outcome {
+        Outcome::Converged if solution.is_minimum() => 2,
+        Outcome::Converged => 1,
         _ => 0,
     }
 }

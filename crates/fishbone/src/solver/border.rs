@@ -1,7 +1,7 @@
 //! Constraints that tie pairs of nodes together: a border around the chain's factorisation.
 
-use super::chain::{Chain, Factor, NodeVector, TooConcave};
-use super::{ROWS, Rows, RowsByNode};
+use super::chain::{Chain, Factor, NodeTerm, NodeVector, TooConcave};
+use super::{Linearisation, ROWS, Rows, RowsByNode};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 /// The constraints between pairs of nodes, with what they need to be eliminated after the chain.
@@ -25,35 +25,48 @@ impl Border {
         }
     }
 
+    /// The same border with the constraints at nodes as rows before its own, and all these rows.
+    pub(super) fn with_nodes(
+        &self,
+        nodes: &[NodeTerm],
+        linear: &Linearisation,
+    ) -> (Self, Vec<[RowsByNode; 2]>) {
+        let at_nodes = nodes.iter().map(|term| [term.node; 2]);
+        let pairs = at_nodes.chain(self.pairs.iter().copied()).collect();
+        let at_nodes = linear.constraints.iter();
+        let at_nodes = at_nodes.map(|rows| [*rows, RowsByNode::zeros()]);
+        let rows = at_nodes.chain(linear.links.iter().copied()).collect();
+        (Self::new(pairs, self.gradient.len()), rows)
+    }
+
     /// Number of rows, used or not.
     pub(super) fn rows(&self) -> usize {
         self.answers.len()
     }
 
-    /// Eliminates the rows, each with a compliance, after a chain that is concave in `concave` directions.
+    /// Eliminates the rows, each with a compliance, after the chain; in how many of the directions in which that is
+    /// concave they hold it.
     ///
-    /// Errors: [`TooConcave`] unless the rows hold all of these directions.
+    /// Errors: [`TooConcave`] where the rows give way in a direction at no cost.
     pub(super) fn factorise(
         &mut self,
         chain: &Chain,
         factor: &mut Factor,
         links: &[[RowsByNode; 2]],
         compliance: f64,
-        concave: usize,
-    ) -> Result<(), TooConcave> {
+    ) -> Result<usize, TooConcave> {
         if self.pairs.is_empty() {
-            return Ok(());
+            return Ok(0);
         }
         let eigen = SymmetricEigen::new(self.give(chain, factor, links, compliance));
-        // With the rows held, the whole is as concave as the chain less the negative directions of what gives way.
-        let negative = |value: &&f64| **value < 0.0;
-        if eigen.eigenvalues.iter().filter(negative).count() != concave {
+        if eigen.eigenvalues.iter().any(|value| *value == 0.0) {
             return Err(TooConcave);
         }
         self.inverse = &eigen.eigenvectors
             * DMatrix::from_diagonal(&eigen.eigenvalues.map(|value| 1.0 / value))
             * eigen.eigenvectors.transpose();
-        Ok(())
+        let negative = |value: &&f64| **value < 0.0;
+        Ok(eigen.eigenvalues.iter().filter(negative).count())
     }
 
     /// How far every row gives way to a unit multiplier of every other, by a compliance of its own and by the chain's.
@@ -128,4 +141,21 @@ impl Border {
         };
         self.pairs.iter().zip(links).map(change).collect()
     }
+}
+
+/// Number of negative eigenvalues of a symmetric matrix whose rows may be of different scales, rows of zeros left out.
+pub(super) fn count_negative(matrix: &DMatrix<f64>) -> usize {
+    const ROUNDING: f64 = 1e-10;
+    let used: Vec<usize> = (0..matrix.nrows())
+        .filter(|row| matrix.row(*row).amax() > 0.0)
+        .collect();
+    let scale = |row: usize| 1.0 / matrix.row(used[row]).amax().sqrt();
+    let scaled = DMatrix::from_fn(used.len(), used.len(), |i, j| {
+        matrix[(used[i], used[j])] * scale(i) * scale(j)
+    });
+    let eigenvalues = scaled.symmetric_eigenvalues();
+    eigenvalues
+        .iter()
+        .filter(|value| **value < -ROUNDING)
+        .count()
 }

@@ -75,8 +75,6 @@ pub struct NodeTerm {
 pub struct Chain {
     /// The stages in order.
     pub stages: Vec<Stage>,
-    /// Second derivative by the state of every node; empty where there is none.
-    pub states: Vec<Matrix6<f64>>,
     /// Which components of the first control are free.
     pub first_free: [bool; 2],
 }
@@ -86,6 +84,8 @@ pub struct Chain {
 pub struct Diagonal {
     /// Second derivative by both controls of every stage, first then second.
     pub controls: Vec<Matrix4<f64>>,
+    /// Second derivative by the state of every node; empty where there is none.
+    pub states: Vec<Matrix6<f64>>,
     /// Terms at single nodes, by rising node.
     pub nodes: Vec<NodeTerm>,
 }
@@ -138,19 +138,25 @@ impl First {
         if most == 0 {
             return Err(TooConcave);
         }
-        let eigen = SymmetricEigen::new(0.5 * (matrix + matrix.transpose()));
+        // Each unknown in a unit of its own: that of a stiff support is not that of a slack rib.
+        let scale = NodeVector::from_fn(|i, _| matrix.row(i).amax().sqrt().recip());
+        let scaled = matrix.component_mul(&(scale * scale.transpose()));
+        let eigen = SymmetricEigen::new(0.5 * (scaled + scaled.transpose()));
         let negative = eigen
             .eigenvalues
             .iter()
             .filter(|value| **value < 0.0)
             .count();
         let floor = f64::EPSILON * eigen.eigenvalues.amax();
-        if negative > most || eigen.eigenvalues.iter().any(|value| value.abs() <= floor) {
+        // The comparison is false for a NaN.
+        let regular = eigen.eigenvalues.iter().all(|value| value.abs() > floor);
+        if negative > most || !regular {
             return Err(TooConcave);
         }
         let inverse = eigen.eigenvectors
             * NodeMatrix::from_diagonal(&eigen.eigenvalues.map(|value| 1.0 / value))
             * eigen.eigenvectors.transpose();
+        let inverse = inverse.component_mul(&(scale * scale.transpose()));
         Ok((Self::Indefinite(inverse), negative))
     }
 
@@ -263,7 +269,7 @@ fn eliminate_all(
     for k in (0..weights.len()).rev() {
         cost[6][6] += damping * weights[k];
         cost[7][7] += damping * weights[k];
-        if let Some(state) = chain.states.get(k) {
+        if let Some(state) = diagonal.states.get(k) {
             for (column, own) in cost.iter_mut().zip(&state.data.0) {
                 for row in 0..6 {
                     column[row] += own[row];
@@ -513,7 +519,7 @@ impl Chain {
             .iter()
             .map(|term| x[term.node].dot(&(term.hessian * y[term.node])));
         let state = |v: &[NodeVector], k: usize| v[k].fixed_rows::<6>(0).into_owned();
-        let states = self.states.iter().enumerate();
+        let states = diagonal.states.iter().enumerate();
         let states = states.map(|(k, own)| state(x, k).dot(&(own * state(y, k))));
         stages.sum::<f64>() + nodes.sum::<f64>() + states.sum::<f64>()
     }
@@ -563,14 +569,15 @@ mod tests {
         (stages[1].tie, stages[1].free) = (Vector2::new(0.0, 0.7), [true, false]);
         stages[3].free = [false, true];
         let stiff = |numbers: &mut _| positive::<6>(numbers) + Matrix6::identity() * STIFF;
+        let states = (0..=STAGES).map(|_| stiff(numbers)).collect();
         let chain = Chain {
             stages,
-            states: (0..=STAGES).map(|_| stiff(numbers)).collect(),
             first_free: [true, false],
         };
         let controls = |_| positive::<4>(numbers) + Matrix4::identity() * STIFF;
         let diagonal = Diagonal {
             controls: (0..STAGES).map(controls).collect(),
+            states,
             nodes: vec![term(0, numbers), term(3, numbers), term(STAGES, numbers)],
         };
         (chain, diagonal)

@@ -2,9 +2,7 @@
 //! step that might lead to another minimum, and tells where there is no more to follow.
 
 use super::interior_point::{State, minimise};
-use super::{
-    Bounds, Curvature, Outcome, Program, Residuals, Rows, RowsByNode, Settings, Solution, Values,
-};
+use super::{Bounds, Outcome, Program, Residuals, Rows, RowsByNode, Settings, Solution, Values};
 use std::ops::ControlFlow;
 
 /// How a minimum was followed.
@@ -195,7 +193,7 @@ where
             proceed,
         );
         way.iterations += found.iterations;
-        if found.outcome != Outcome::Converged || found.curvature == Curvature::Negative {
+        if !found.is_minimum() {
             return false;
         }
         let moved = length * (next - way.done);
@@ -224,10 +222,7 @@ where
     pub fn solution(&mut self) -> Solution<P::Point> {
         let residuals = self.state.residuals();
         let state = &mut self.state;
-        let curvature =
-            state
-                .newton
-                .curvature(&state.linear, &state.values, &state.bound_multipliers);
+        let inertia = state.inertia();
         let solution = Solution {
             point: state.point.clone(),
             values: state.values.clone(),
@@ -236,8 +231,9 @@ where
             residuals,
             iterations: 0,
             outcome: Outcome::Converged,
-            curvature,
+            inertia,
         };
+        self.state.linearise();
         self.factorise();
         solution
     }

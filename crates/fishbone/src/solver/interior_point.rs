@@ -4,8 +4,8 @@ use super::chain::NodeVector;
 use super::filter::{Filter, Measure};
 use super::newton::Newton;
 use super::{
-    BOUNDS, Bounds, Linearisation, Outcome, Program, Residuals, Rows, Settings, Solution, Values,
-    add_controls, larger,
+    BOUNDS, Bounds, Inertia, Linearisation, Outcome, Program, Residuals, Rows, Settings, Solution,
+    Values, add_controls, larger,
 };
 use std::ops::ControlFlow;
 
@@ -147,19 +147,29 @@ impl<P: Program> State<P> {
             self.linearise();
         }
         self.prefer_zero_multipliers();
-        let curvature = self
-            .newton
-            .curvature(&self.linear, &self.values, &self.bound_multipliers);
+        let residuals = self.residuals();
+        let inertia = self.inertia();
         Solution {
-            residuals: self.residuals(),
+            residuals,
             point: self.point,
             values: self.values,
             multipliers: self.multipliers,
             bound_multipliers: self.bound_multipliers,
             iterations: self.iteration,
             outcome,
-            curvature,
+            inertia,
         }
+    }
+
+    /// Inertia of the second variation; the linearisation is not to be relied on afterwards.
+    pub(super) fn inertia(&mut self) -> Option<Inertia> {
+        let metric = self.program.metric(&self.point);
+        self.newton.inertia(
+            &mut self.linear,
+            &self.values,
+            &self.bound_multipliers,
+            &metric,
+        )
     }
 
     /// Drops multipliers that stationarity does not need: where constraints depend on each other they are not unique.
@@ -496,7 +506,7 @@ fn largest<'a>(numbers: impl Iterator<Item = &'a f64>) -> f64 {
 mod tests {
     use super::super::RowsByNode;
     use super::*;
-    use nalgebra::Vector4;
+    use nalgebra::{Matrix6, Vector4};
 
     const STAGES: usize = 8;
 
@@ -630,6 +640,12 @@ mod tests {
             for (k, change) in step.iter().enumerate() {
                 into.push[k] = [0, 1].map(|i| ride.push[k][i] + length * change[6 + i]);
             }
+        }
+
+        fn metric(&self, _: &Ride) -> Vec<Matrix6<f64>> {
+            let mut along = Matrix6::zeros();
+            along[(0, 0)] = SHARE;
+            vec![along; STAGES + 1]
         }
     }
 

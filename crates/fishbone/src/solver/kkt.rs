@@ -1,9 +1,9 @@
 //! The first-order conditions of a solution, linearised and factorised: how it answers to small changes of its programme.
 
-use super::chain::NodeVector;
+use super::chain::{NodeVector, TooConcave};
 use super::newton::Newton;
 use super::{BOUNDS, Bounds, Linearisation, Program, Rows, Values, add_controls, larger};
-use nalgebra::{SVector, Vector2, Vector4};
+use nalgebra::{Matrix6, SVector, Vector2, Vector4};
 
 /// Most times that the solution of the system is improved by what it misses.
 const REFINEMENTS: usize = 20;
@@ -32,6 +32,7 @@ pub struct Kkt {
     pairs: Vec<[usize; 2]>,
     /// Multiplier over slack of every bound in use; 0 of the others.
     stiffness: Bounds,
+    metric: Vec<Matrix6<f64>>,
 }
 
 /// A vector of the system: its right-hand side, or its solution.
@@ -60,6 +61,34 @@ impl Kkt {
         multipliers: &[Rows],
         bounds: &Bounds,
     ) -> Result<Self, Singular> {
+        let mut kkt = Self::assemble(program, point, multipliers, bounds)?;
+        let factorised = kkt.newton.factorise_damped(&kkt.linear, 0.0);
+        factorised.map_err(|TooConcave| Singular)?;
+        Ok(kkt)
+    }
+
+    /// The same at any solution, minimum or not.
+    ///
+    /// Errors: [`Singular`] where the second variation vanishes in some direction.
+    pub fn factorise_any<P: Program>(
+        program: &P,
+        point: &mut P::Point,
+        multipliers: &[Rows],
+        bounds: &Bounds,
+    ) -> Result<Self, Singular> {
+        let mut kkt = Self::assemble(program, point, multipliers, bounds)?;
+        kkt.linear.hold_idle_controls();
+        kkt.refactorise()?;
+        Ok(kkt)
+    }
+
+    /// The system, not factorised yet.
+    fn assemble<P: Program>(
+        program: &P,
+        point: &mut P::Point,
+        multipliers: &[Rows],
+        bounds: &Bounds,
+    ) -> Result<Self, Singular> {
         let mut values = Values::default();
         if !program.evaluate(point, &mut values) {
             return Err(Singular);
@@ -69,9 +98,6 @@ impl Kkt {
         let (pairs, used) = (program.linked_nodes(), program.bounds());
         let mut newton = Newton::new(&linear, pairs.clone(), &program.weights(), used);
         newton.assemble(&linear, &values, bounds);
-        newton
-            .factorise_damped(&linear, 0.0)
-            .map_err(|_| Singular)?;
         let mut stiffness = vec![[0.0; BOUNDS]; bounds.len()];
         for (k, stiffness) in stiffness.iter_mut().enumerate() {
             for (b, stiffness) in stiffness.iter_mut().enumerate().take(used) {
@@ -83,7 +109,37 @@ impl Kkt {
             newton,
             pairs,
             stiffness,
+            metric: program.metric(point),
         })
+    }
+
+    fn refactorise(&mut self) -> Result<(), Singular> {
+        let factorised = self.newton.factorise_any(&self.linear);
+        factorised.map_err(|TooConcave| Singular)
+    }
+
+    /// Takes a multiple of the metric off the second derivatives and factorises the system again; in how many directions,
+    /// of those that the constraints leave, it is negative then.
+    ///
+    /// Errors: [`Singular`] where it vanishes in some direction.
+    pub(super) fn shift(&mut self, by: f64) -> Result<usize, Singular> {
+        self.linear.diagonal.shift(&self.metric, by);
+        self.newton.shift(&self.metric, by);
+        let negative = self.newton.count_negative(&self.linear);
+        let negative = negative.map_err(|TooConcave| Singular)?;
+        self.refactorise()?;
+        Ok(negative)
+    }
+
+    /// The pull of the metric on motions: its product with them.
+    pub(super) fn pull(&self, motion: &[NodeVector]) -> Vec<NodeVector> {
+        let pull = |(metric, motion): (&Matrix6<f64>, &NodeVector)| {
+            let mut pull = NodeVector::zeros();
+            pull.fixed_rows_mut::<6>(0)
+                .copy_from(&(metric * motion.fixed_rows::<6>(0)));
+            pull
+        };
+        self.metric.iter().zip(motion).map(pull).collect()
     }
 
     /// A vector of zeros.
@@ -210,7 +266,7 @@ impl Kkt {
             by_second += stage.state_second.tr_mul(&step[k]);
             add_controls(into, k, &by_controls);
         }
-        for (k, own) in chain.states.iter().enumerate() {
+        for (k, own) in diagonal.states.iter().enumerate() {
             let mut by_state = into[k].fixed_rows_mut::<6>(0);
             by_state += own * step[k].fixed_rows::<6>(0);
         }

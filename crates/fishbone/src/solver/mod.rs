@@ -9,18 +9,22 @@ mod border;
 pub mod chain;
 mod filter;
 mod follow;
+mod inertia;
 mod interior_point;
 mod kkt;
+mod modes;
 mod newton;
 mod rank;
 
 pub use follow::{Followed, Follower, Shape};
+pub use inertia::Inertia;
 pub use interior_point::minimise;
 pub use kkt::{Kkt, KktVector, Singular};
+pub use modes::{Mode, lowest_modes};
 pub use rank::dependent_constraints;
 
 use chain::{Chain, Diagonal, NodeMatrix, NodeTerm, NodeVector, Stage};
-use nalgebra::{Matrix4, SMatrix, SVector, Vector4};
+use nalgebra::{Matrix4, Matrix6, SMatrix, SVector, Vector4};
 
 /// Most equality constraints at one node, or between one pair of nodes.
 pub const ROWS: usize = 6;
@@ -109,6 +113,10 @@ pub trait Program {
         length: f64,
         into: &mut Self::Point,
     );
+
+    /// The square of how far a change of its state moves each node, with its share in the whole: by this the eigenvalues of
+    /// the second variation are measured.
+    fn metric(&self, point: &Self::Point) -> Vec<Matrix6<f64>>;
 }
 
 impl<P: Program> Program for &P {
@@ -160,6 +168,10 @@ impl<P: Program> Program for &P {
         into: &mut Self::Point,
     ) {
         (*self).retract(point, step, length, into);
+    }
+
+    fn metric(&self, point: &Self::Point) -> Vec<Matrix6<f64>> {
+        (*self).metric(point)
     }
 }
 
@@ -235,11 +247,17 @@ pub struct Solution<P> {
     pub iterations: usize,
     /// Why it ended.
     pub outcome: Outcome,
-    /// Sign of the second variation there.
-    pub curvature: Curvature,
+    /// Inertia of the second variation there; `None` where it cannot be decided.
+    pub inertia: Option<Inertia>,
 }
 
 impl<P> Solution<P> {
+    /// Whether it is a minimum, or not told from one.
+    pub fn is_minimum(&self) -> bool {
+        let descends = self.inertia.is_some_and(|inertia| inertia.negative > 0);
+        self.outcome == Outcome::Converged && !descends
+    }
+
     /// The same with the iterations of what went before counted in.
     pub fn after(self, iterations: usize) -> Self {
         Self {
@@ -247,17 +265,6 @@ impl<P> Solution<P> {
             ..self
         }
     }
-}
-
-/// Sign of the second variation on the tangent space of the constraints.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Curvature {
-    /// Positive in every direction: a strict local minimum.
-    Positive,
-    /// Zero in some direction, as far as rounding lets one tell.
-    Marginal,
-    /// Negative in some direction: not a minimum.
-    Negative,
 }
 
 impl Linearisation {
@@ -274,11 +281,11 @@ impl Linearisation {
             links: vec![[RowsByNode::zeros(); 2]; program.linked_nodes().len()],
             chain: Chain {
                 stages: vec![Stage::zero(); stages],
-                states: Vec::new(),
                 first_free: [true; 2],
             },
             diagonal: Diagonal {
                 controls: vec![Matrix4::zeros(); stages],
+                states: Vec::new(),
                 nodes,
             },
             gradient: vec![NodeVector::zeros(); stages + 1],

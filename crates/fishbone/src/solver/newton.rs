@@ -1,8 +1,8 @@
 //! The Newton system of a barrier problem: bounds eliminated, inertia controlled, constraints met exactly.
 
-use super::border::Border;
+use super::border::{Border, count_negative};
 use super::chain::{Diagonal, Factor, NodeVector, TooConcave};
-use super::{BOUNDS, Bounds, Curvature, Linearisation, Rows, RowsByNode, Values, larger};
+use super::{BOUNDS, Bounds, Linearisation, Rows, RowsByNode, Values, larger};
 
 /// Compliance lent to the constraints so that the chain can be factorised without them; refinement takes it back.
 const COMPLIANCE: f64 = 1e-7;
@@ -13,10 +13,10 @@ const EXACT: f64 = 1e-12;
 /// The factorised Newton system and its solution, with the room it needs.
 #[derive(Debug, Clone)]
 pub(super) struct Newton {
-    diagonal: Diagonal,
+    pub(super) diagonal: Diagonal,
     /// What every bound resists with: multiplier over slack as they were assembled.
     stiffness: Bounds,
-    factor: Factor,
+    pub(super) factor: Factor,
     border: Border,
     weights: Vec<f64>,
     bounds: usize,
@@ -64,7 +64,7 @@ impl Newton {
     }
 
     /// The same with the bounds of which `counts(slack, multiplier per weight)` is false left out.
-    fn assemble_where(
+    pub(super) fn assemble_where(
         &mut self,
         linear: &Linearisation,
         values: &Values,
@@ -74,6 +74,7 @@ impl Newton {
         self.diagonal
             .controls
             .copy_from_slice(&linear.diagonal.controls);
+        self.diagonal.states.clone_from(&linear.diagonal.states);
         for (k, controls) in self.diagonal.controls.iter_mut().enumerate() {
             for (b, gradient) in linear.slacks[k].iter().enumerate().take(self.bounds) {
                 let (slack, multiplier) = (values.slacks[k][b], bounds[k][b]);
@@ -110,42 +111,57 @@ impl Newton {
     }
 
     /// Factorises with a given damping of the controls per unit weight.
+    ///
+    /// Errors: [`TooConcave`] where it is concave in any direction that the constraints leave.
     pub(super) fn factorise_damped(
         &mut self,
         linear: &Linearisation,
         damping: f64,
     ) -> Result<(), TooConcave> {
-        let most = self.border.rows();
-        let (chain, factor) = (&linear.chain, &mut self.factor);
-        let concave = chain.factorise(&self.diagonal, damping, &self.node_weights, most, factor)?;
-        self.border
-            .factorise(chain, factor, &linear.links, COMPLIANCE, concave)
+        match self.factorise_concave(linear, damping, self.border.rows())? {
+            0 => Ok(()),
+            _ => Err(TooConcave),
+        }
     }
 
-    /// Sign of the second variation: positive must hold with the doubtful bounds free, negative with them held, both
-    /// with a margin for rounding and the error of the mesh.
-    pub(super) fn curvature(
+    /// Factorises, however concave.
+    ///
+    /// Errors: [`TooConcave`] where there is a direction of no curvature.
+    pub(super) fn factorise_any(&mut self, linear: &Linearisation) -> Result<(), TooConcave> {
+        self.factorise_concave(linear, 0.0, usize::MAX).map(drop)
+    }
+
+    /// Factorises a chain that is concave in so many directions at most; in how many of them the links leave it so.
+    fn factorise_concave(
         &mut self,
         linear: &Linearisation,
-        values: &Values,
-        bounds: &Bounds,
-    ) -> Curvature {
-        const MARGIN: f64 = 1e-4;
-        const CLEAR: f64 = 100.0;
-        self.assemble_where(linear, values, bounds, |slack, multiplier| {
-            multiplier > CLEAR * slack
-        });
-        if self.factorise_damped(linear, -MARGIN).is_ok() {
-            return Curvature::Positive;
+        damping: f64,
+        most: usize,
+    ) -> Result<usize, TooConcave> {
+        let (chain, factor) = (&linear.chain, &mut self.factor);
+        let concave = chain.factorise(&self.diagonal, damping, &self.node_weights, most, factor)?;
+        let held = self
+            .border
+            .factorise(chain, factor, &linear.links, COMPLIANCE)?;
+        Ok(concave.saturating_sub(held))
+    }
+
+    /// In how many of the directions that the constraints leave the second derivative as assembled is negative.
+    ///
+    /// With the constraints as springs the count can only be too large: what they hold in truth, as they give way to
+    /// nothing, is taken off.
+    ///
+    /// Errors: [`TooConcave`] where there is a direction of no curvature.
+    pub(super) fn count_negative(&mut self, linear: &Linearisation) -> Result<usize, TooConcave> {
+        let (chain, factor) = (&linear.chain, &mut self.factor);
+        let most = usize::MAX;
+        let concave = chain.factorise(&self.diagonal, 0.0, &self.node_weights, most, factor)?;
+        if concave == 0 {
+            return Ok(0);
         }
-        self.assemble_where(linear, values, bounds, |slack, multiplier| {
-            CLEAR * multiplier > slack
-        });
-        if self.factorise_damped(linear, MARGIN).is_ok() {
-            Curvature::Marginal
-        } else {
-            Curvature::Negative
-        }
+        let (mut constraints, rows) = self.border.with_nodes(&self.diagonal.nodes, linear);
+        let give = constraints.give(chain, factor, &rows, 0.0);
+        Ok(concave.saturating_sub(count_negative(&give)))
     }
 
     /// Finds the step of least cost whose constraints change by `−targets`, and the multipliers' step.

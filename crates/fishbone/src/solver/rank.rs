@@ -2,7 +2,7 @@
 
 use super::border::Border;
 use super::chain::Factor;
-use super::{BOUNDS, Linearisation, Program, ROWS, Rows, RowsByNode};
+use super::{BOUNDS, Linearisation, Program, ROWS, Rows};
 use nalgebra::{DMatrix, Matrix4, SymmetricEigen};
 
 /// The constraints whose derivatives depend on each other at a point, by their places among the values: those of nodes
@@ -21,17 +21,8 @@ pub fn dependent_constraints<P: Program>(program: &P, point: &P::Point) -> Vec<u
     {
         return Vec::new();
     }
-    let at_nodes = program.constrained_nodes().into_iter();
-    let pairs: Vec<_> = at_nodes
-        .map(|node| [node; 2])
-        .chain(program.linked_nodes())
-        .collect();
-    let at_nodes = linear.constraints.iter();
-    let rows: Vec<_> = at_nodes
-        .map(|rows| [*rows, RowsByNode::zeros()])
-        .chain(linear.links.iter().copied())
-        .collect();
-    let mut border = Border::new(pairs, stages + 1);
+    let links = Border::new(program.linked_nodes(), stages + 1);
+    let (mut border, rows) = links.with_nodes(&linear.diagonal.nodes, &linear);
     involved(&border.give(&linear.chain, &mut factor, &rows, 0.0))
 }
 
@@ -52,7 +43,7 @@ impl Linearisation {
             stage.state_first.fill(0.0);
             stage.state_second.fill(0.0);
         }
-        self.chain.states.clear();
+        self.diagonal.states.clear();
         self.diagonal.controls.fill(Matrix4::zeros());
         for term in &mut self.diagonal.nodes {
             term.hessian.fill(0.0);
