@@ -9,7 +9,7 @@ mod search;
 use crate::belt::Belt;
 use crate::program::{BeltPoint, BeltProgram};
 use crate::scenario::{BeltSpec, LinkSpec, Method, Scenario, SupportSpec};
-use crate::solver::{Bounds, Inertia, Residuals, Rows, Solution};
+use crate::solver::{Inertia, Residuals, Solution, Stationary};
 use crate::spine::Spine;
 use crate::stability::Stability;
 use nalgebra::Vector3;
@@ -95,9 +95,7 @@ pub struct Equilibrium {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Solved {
     pub(crate) program: BeltProgram,
-    pub(crate) point: BeltPoint,
-    pub(crate) multipliers: Vec<Rows>,
-    pub(crate) bound_multipliers: Bounds,
+    pub(crate) at: Stationary<BeltPoint>,
     pub(crate) inertia: Option<Inertia>,
     pub(crate) units: Units,
     /// Where the programme has its origin.
@@ -164,6 +162,12 @@ pub(crate) fn of_solution(
 ) -> Equilibrium {
     let belt = Belt::new(&scenario.belt).expect("a validated scenario");
     intrinsic::of_solution(scenario, &belt, program, solution)
+}
+
+/// The programme of a scenario on a mesh of so many elements, no rib held by edges beyond its own stretch.
+pub(crate) fn program_of(scenario: &Scenario, elements: usize) -> BeltProgram {
+    let belt = Belt::new(&scenario.belt).expect("a validated scenario");
+    assembly::Assembly::new(scenario, &belt).program(elements)
 }
 
 /// Whether the ribs of a shape are apart on the whole board.

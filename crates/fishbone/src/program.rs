@@ -501,13 +501,11 @@ impl Program for BeltProgram {
                 Piece::Rigid { .. } | Piece::Joint { .. } => [1.0; BOUNDS],
             });
         }
-        let admissible = values.slacks.iter().flatten().all(|slack| *slack > 0.0);
-        if !admissible || self.rib_leaves_through_bend(point) {
+        values.constraints.clear();
+        if self.rib_leaves_through_bend(point) {
             return false;
         }
         self.carry(point);
-        values.objective = self.elastic_energy(&point.fields) + self.load_potential(&point.poses);
-        values.constraints.clear();
         let supports = self.supports.iter();
         values
             .constraints
@@ -516,7 +514,12 @@ impl Program for BeltProgram {
         values
             .constraints
             .extend(links.map(|link| link.value(point)));
-        values.objective.is_finite()
+        let admissible = values.slacks.iter().flatten().all(|slack| *slack > 0.0);
+        if admissible {
+            values.objective =
+                self.elastic_energy(&point.fields) + self.load_potential(&point.poses);
+        }
+        admissible && values.objective.is_finite()
     }
 
     fn constraint_jacobians(&self, point: &BeltPoint, into: &mut [RowsByNode]) {

@@ -121,17 +121,12 @@ impl Equilibrium {
         if solved.is_flat {
             return Err(NoSensitivity::Flat);
         }
-        let kkt = Kkt::factorise(
-            &solved.program,
-            &mut solved.point.clone(),
-            &solved.multipliers,
-            &solved.bound_multipliers,
-        );
+        let kkt = Kkt::factorise(&solved.program, &mut solved.at.clone());
         let mut sensitivity = Sensitivity {
             kkt: kkt.map_err(|Singular| NoSensitivity::Marginal)?,
             system: System::new(solved),
             scales: Scales::new(&self.scenario, solved),
-            nodes: solved.point.poses.len(),
+            nodes: solved.at.point.poses.len(),
         };
         let is_strict = solved.inertia.is_some_and(|inertia| inertia.zero == 0);
         match is_strict || sensitivity.is_held() {

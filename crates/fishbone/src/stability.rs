@@ -76,17 +76,11 @@ impl Equilibrium {
         if self.status != Status::Converged {
             return Err(NoModes::NotConverged);
         }
-        let modes = solver::lowest_modes(
-            &solved.program,
-            &mut solved.point.clone(),
-            &solved.multipliers,
-            &solved.bound_multipliers,
-            count,
-        );
+        let modes = solver::lowest_modes(&solved.program, &mut solved.at.clone(), count);
         let length = solved.units.length;
         let of_node = |node: usize, motion: &solver::chain::NodeVector| {
             let rotation = motion.fixed_rows::<3>(3).into_owned();
-            let position = solved.point.poses[node].position;
+            let position = solved.at.point.poses[node].position;
             Motion {
                 translation: motion.fixed_rows::<3>(0) + rotation.cross(&position),
                 rotation: rotation / length,

@@ -2,8 +2,9 @@
 
 use crate::equilibrium::{Equilibrium, Status, Units, Wrench, is_settled, of_solution, solve_from};
 use crate::lie::{Pose, exp};
+use crate::path::with_pose;
 use crate::program::{BeltPoint, BeltProgram, Piece};
-use crate::scenario::{Component, Scenario};
+use crate::scenario::Scenario;
 use crate::solver::{Followed, Follower, Residuals, Shape};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use std::ops::ControlFlow;
@@ -84,9 +85,7 @@ impl Tracker {
         let follower = Follower::new(
             solved.program.clone(),
             scenario.solver.tolerance,
-            solved.point.clone(),
-            &solved.multipliers,
-            &solved.bound_multipliers,
+            &solved.at,
         )
         .ok_or(NoTracker::Marginal)?;
         let bends = |piece: &Piece| match piece {
@@ -95,7 +94,7 @@ impl Tracker {
             Piece::Rigid { .. } => false,
         };
         let (units, origin) = (solved.units, solved.origin);
-        let (program, point) = (&solved.program, &solved.point);
+        let (program, point) = (&solved.program, &solved.at.point);
         let stored = program.elastic_energy(&point.fields) + program.load_potential(&point.poses);
         Ok(Self {
             support,
@@ -150,7 +149,7 @@ impl Tracker {
                 residuals: followed.residuals,
             };
         }
-        let scenario = self.scenario_at(position, rotation);
+        let scenario = self.scenario_at(&goal);
         let found = solve_from(&scenario, self.follower.point(), proceed);
         self.take(&found, followed)
     }
@@ -161,7 +160,7 @@ impl Tracker {
         const SAME: f64 = 0.01;
         let solved = found.solved.as_ref();
         let is_same = |shape: &BeltPoint| shape.distance(self.follower.point()) < SAME;
-        let goes_on = followed.arrived && solved.is_some_and(|solved| is_same(&solved.point));
+        let goes_on = followed.arrived && solved.is_some_and(|solved| is_same(&solved.at.point));
         let mut update = Update {
             status: found.status,
             snapped: found.status == Status::Converged && (followed.jumped || !goes_on),
@@ -194,20 +193,17 @@ impl Tracker {
     }
 
     /// The scenario with the support elsewhere.
-    fn scenario_at(&self, position: &Vector3<f64>, rotation: &Vector3<f64>) -> Scenario {
-        let mut scenario = self.scenario.clone();
-        let support = &mut scenario.supports[self.support];
-        support.position = Some([0, 1, 2].map(|i| Component::Held(position[i])));
-        support.rotation = Some((*rotation).into());
-        (support.euler, support.quaternion) = (None, None);
-        scenario
+    fn scenario_at(&self, pose: &Pose) -> Scenario {
+        let pose = Pose {
+            frame: pose.frame,
+            position: self.origin + pose.position * self.units.length,
+        };
+        with_pose(&self.scenario, self.support, &pose)
     }
 
     /// All that is to be known of the present equilibrium.
     pub fn equilibrium(&mut self) -> Equilibrium {
-        let position = self.origin + self.pose.position * self.units.length;
-        let rotation = crate::lie::log(&self.pose.frame);
-        let scenario = self.scenario_at(&position, &rotation);
+        let scenario = self.scenario_at(&self.pose);
         let solution = self.follower.solution();
         of_solution(&scenario, self.follower.program().clone(), solution)
     }

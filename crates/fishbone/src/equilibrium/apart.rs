@@ -32,14 +32,14 @@ pub(super) fn keep_apart(
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> (Solution<BeltPoint>, Option<f64>) {
     for _ in 0..ROUNDS {
-        let spine = assembly.spine(program, &solution.point);
+        let spine = assembly.spine(program, &solution.at.point);
         if solution.outcome != Outcome::Converged || unsettled(program, &spine).is_none() {
             return (solution, None);
         }
         take_further_edges(program, &spine);
         solution = search.again(program, solution, proceed);
     }
-    let spine = assembly.spine(program, &solution.point);
+    let spine = assembly.spine(program, &solution.at.point);
     let unsettled = unsettled(program, &spine).map(|element| spine.u[element]);
     (solution, unsettled)
 }

@@ -71,15 +71,15 @@ fn equilibrium(
     twice: Option<String>,
 ) -> Equilibrium {
     let units = assembly.units;
-    let spine = assembly.spine(&program, &solution.point);
+    let spine = assembly.spine(&program, &solution.at.point);
     let half_turns = match status {
         Status::Converged => half_turns(&spine),
         Status::Infeasible | Status::NotConverged => None,
     };
-    let internal = program.internal(&solution.point, &solution.multipliers);
+    let internal = program.internal(&solution.at.point, &solution.at.multipliers);
     let stability = stability(status, solution.inertia, &internal);
-    let links = program.link_forces(&solution.multipliers).into_iter();
-    let is_flat = is_flat_under_load(&program, &solution.point);
+    let links = program.link_forces(&solution.at.multipliers).into_iter();
+    let is_flat = is_flat_under_load(&program, &solution.at.point);
     Equilibrium {
         status,
         message,
@@ -91,7 +91,7 @@ fn equilibrium(
         .concat(),
         half_turns,
         energy: solution.values.objective * units.energy + assembly.potential_of_origin(),
-        elastic_energy: program.elastic_energy(&solution.point.fields) * units.energy,
+        elastic_energy: program.elastic_energy(&solution.at.point.fields) * units.energy,
         torsion: spine.torsion(),
         spine,
         internal: internal.into_iter().map(|w| units.wrench(w)).collect(),
@@ -108,9 +108,7 @@ fn equilibrium(
         scenario: scenario.clone(),
         solved: Some(Solved {
             program,
-            point: solution.point,
-            multipliers: solution.multipliers,
-            bound_multipliers: solution.bound_multipliers,
+            at: solution.at,
             inertia: solution.inertia,
             units,
             origin: assembly.origin,
@@ -382,7 +380,7 @@ fn reactions(
     solution: &Solution<BeltPoint>,
     units: Units,
 ) -> Vec<Reaction> {
-    let wrenches = program.reactions(&solution.point, &solution.multipliers);
+    let wrenches = program.reactions(&solution.at.point, &solution.at.multipliers);
     let supports = scenario.supports.iter().zip(wrenches);
     supports
         .map(|(support, wrench)| Reaction {

@@ -54,7 +54,7 @@ impl Search {
             return self.cold(program, proceed);
         };
         let found = self.cold(coarse, proceed);
-        let fine = prolong(coarse, &found.point, program);
+        let fine = prolong(coarse, &found.at.point, program);
         if found.outcome == Outcome::Interrupted {
             // The shape still has to be one of the mesh asked for.
             return self.minimise(program, fine, WARM, &mut || ControlFlow::Break(()));
@@ -76,7 +76,8 @@ impl Search {
         proceed: &mut Proceed,
     ) -> Solution<BeltPoint> {
         let iterations = found.iterations;
-        self.from(program, found.point, proceed).after(iterations)
+        self.from(program, found.at.point, proceed)
+            .after(iterations)
     }
 
     /// Searches from a shape of the same mesh; anew where that leads to no minimum.
@@ -104,9 +105,9 @@ impl Search {
             best = better(best, |_| self.by_way_of_another(program, &start, proceed));
         }
         for (slope, wave) in [(SLANT, 0.0), (-SLANT, 0.0), (0.0, 1.0), (0.0, 2.0)] {
-            if best.outcome != Outcome::Interrupted && is_flat_under_load(program, &best.point) {
+            if best.outcome != Outcome::Interrupted && is_flat_under_load(program, &best.at.point) {
                 best = better(best, |best| {
-                    let buckled = buckle(program, &best.point, slope, wave, &self.bulge);
+                    let buckled = buckle(program, &best.at.point, slope, wave, &self.bulge);
                     self.minimise(program, buckled, WARM, proceed)
                 });
             }
@@ -117,7 +118,7 @@ impl Search {
             }
             best = better(best, |best| {
                 let from = if best.outcome == Outcome::Converged {
-                    &best.point
+                    &best.at.point
                 } else {
                     &start
                 };
@@ -142,6 +143,7 @@ impl Search {
             let cut = program.cut_and_twisted(angle);
             point = self
                 .minimise(&cut, inside(&cut, point), WARM, proceed)
+                .at
                 .point;
         }
         inside(program, point)
@@ -162,7 +164,7 @@ impl Search {
         };
         let found = self.minimise(&other, start.clone(), COLD, proceed);
         let iterations = found.iterations;
-        self.minimise(program, inside(program, found.point), WARM, proceed)
+        self.minimise(program, inside(program, found.at.point), WARM, proceed)
             .after(iterations)
     }
 

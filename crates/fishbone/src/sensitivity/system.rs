@@ -32,14 +32,14 @@ pub(super) struct System {
 
 impl System {
     pub(super) fn new(solved: &Solved) -> Self {
-        let (program, point) = (&solved.program, &solved.point);
-        let supports = program.supports.iter().zip(&solved.multipliers);
+        let (program, point) = (&solved.program, &solved.at.point);
+        let supports = program.supports.iter().zip(&solved.at.multipliers);
         Self {
             turns: supports
                 .map(|(support, rows)| support.turn(&point.poses[support.node], rows))
                 .collect(),
-            elements: by_data(program, point, &solved.bound_multipliers),
-            multipliers: solved.multipliers.clone(),
+            elements: by_data(program, point, &solved.at.bound_multipliers),
+            multipliers: solved.at.multipliers.clone(),
             program: program.clone(),
             point: point.clone(),
         }

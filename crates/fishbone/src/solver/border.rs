@@ -45,7 +45,7 @@ impl Border {
     }
 
     /// Eliminates the rows, each with a compliance, after the chain; in how many of the directions in which that is
-    /// concave they hold it.
+    /// concave they hold it. Rows that follow from others bear nothing.
     ///
     /// Errors: [`TooConcave`] where the rows give way in a direction at no cost.
     pub(super) fn factorise(
@@ -55,17 +55,28 @@ impl Border {
         links: &[[RowsByNode; 2]],
         compliance: f64,
     ) -> Result<usize, TooConcave> {
+        const ROUNDING: f64 = 1e-14;
         if self.pairs.is_empty() {
             return Ok(0);
         }
-        let eigen = SymmetricEigen::new(self.give(chain, factor, links, compliance));
-        if eigen.eigenvalues.iter().any(|value| *value == 0.0) {
+        let give = self.give(chain, factor, links, compliance);
+        // Each row in a unit of its own: that of a spring is not that of a belt.
+        let scale = DVector::from_fn(self.rows(), |row, _| match give.row(row).amax() {
+            0.0 => 0.0,
+            largest => largest.sqrt().recip(),
+        });
+        let scaled = give.component_mul(&(&scale * scale.transpose()));
+        if scaled.iter().any(|entry| !entry.is_finite()) {
             return Err(TooConcave);
         }
-        self.inverse = &eigen.eigenvectors
-            * DMatrix::from_diagonal(&eigen.eigenvalues.map(|value| 1.0 / value))
+        let eigen = SymmetricEigen::new(scaled);
+        let counts = |value: f64| value.abs() > ROUNDING;
+        let inverse = |value: f64| if counts(value) { value.recip() } else { 0.0 };
+        let inverse = &eigen.eigenvectors
+            * DMatrix::from_diagonal(&eigen.eigenvalues.map(inverse))
             * eigen.eigenvectors.transpose();
-        let negative = |value: &&f64| **value < 0.0;
+        self.inverse = inverse.component_mul(&(&scale * scale.transpose()));
+        let negative = |value: &&f64| counts(**value) && **value < 0.0;
         Ok(eigen.eigenvalues.iter().filter(negative).count())
     }
 
@@ -141,21 +152,4 @@ impl Border {
         };
         self.pairs.iter().zip(links).map(change).collect()
     }
-}
-
-/// Number of negative eigenvalues of a symmetric matrix whose rows may be of different scales, rows of zeros left out.
-pub(super) fn count_negative(matrix: &DMatrix<f64>) -> usize {
-    const ROUNDING: f64 = 1e-10;
-    let used: Vec<usize> = (0..matrix.nrows())
-        .filter(|row| matrix.row(*row).amax() > 0.0)
-        .collect();
-    let scale = |row: usize| 1.0 / matrix.row(used[row]).amax().sqrt();
-    let scaled = DMatrix::from_fn(used.len(), used.len(), |i, j| {
-        matrix[(used[i], used[j])] * scale(i) * scale(j)
-    });
-    let eigenvalues = scaled.symmetric_eigenvalues();
-    eigenvalues
-        .iter()
-        .filter(|value| **value < -ROUNDING)
-        .count()
 }

@@ -2,7 +2,9 @@
 //! step that might lead to another minimum, and tells where there is no more to follow.
 
 use super::interior_point::{State, minimise};
-use super::{Bounds, Outcome, Program, Residuals, Rows, RowsByNode, Settings, Solution, Values};
+use super::{
+    Outcome, Program, Residuals, Rows, RowsByNode, Settings, Solution, Stationary, Values,
+};
 use std::ops::ControlFlow;
 
 /// How a minimum was followed.
@@ -22,22 +24,14 @@ pub struct Followed {
 pub struct Follower<P: Program> {
     state: State<P>,
     /// The last minimum on the way.
-    last: Minimum<P::Point>,
+    last: Stationary<P::Point>,
     /// The minimum from which the way began.
-    first: Minimum<P::Point>,
+    first: Stationary<P::Point>,
     /// Room for the derivatives of the constraints at nodes.
     jacobians: Vec<RowsByNode>,
 }
 
-/// What is kept of a minimum to go back to it.
-#[derive(Clone)]
-struct Minimum<P> {
-    point: P,
-    multipliers: Vec<Rows>,
-    bound_multipliers: Bounds,
-}
-
-impl<P: Shape> Minimum<P> {
+impl<P: Shape> Stationary<P> {
     fn copy_from(&mut self, other: &Self) {
         self.point.copy_from(&other.point);
         self.multipliers.copy_from_slice(&other.multipliers);
@@ -60,24 +54,13 @@ where
     P::Point: Shape,
 {
     /// Starts at a minimum; `None` where it is none that can be followed.
-    pub fn new(
-        program: P,
-        tolerance: f64,
-        point: P::Point,
-        multipliers: &[Rows],
-        bound_multipliers: &Bounds,
-    ) -> Option<Self> {
+    pub fn new(program: P, tolerance: f64, minimum: &Stationary<P::Point>) -> Option<Self> {
         let settings = Settings {
             tolerance,
             iterations: 0,
             barrier: 0.0,
         };
-        let minimum = Minimum {
-            point: point.clone(),
-            multipliers: multipliers.to_vec(),
-            bound_multipliers: bound_multipliers.clone(),
-        };
-        let mut state = State::new(program, settings, point);
+        let mut state = State::new(program, settings, minimum.point.clone());
         // Half of what complementarity may be: the higher, the farther a Newton step is good for.
         let heaviest = state.weights.iter().fold(0.0, |most: f64, w| most.max(*w));
         state.barrier = 0.5 * tolerance / heaviest;
@@ -87,11 +70,7 @@ where
             state,
             last: minimum.clone(),
         };
-        let started = follower.start_from(
-            &minimum.point,
-            &minimum.multipliers,
-            &minimum.bound_multipliers,
-        );
+        let started = follower.start_from(minimum);
         follower.keep();
         started.then_some(follower)
     }
@@ -197,21 +176,18 @@ where
             return false;
         }
         let moved = length * (next - way.done);
-        way.jumped |= found.point.distance(&self.last.point) > SMOOTH * moved + OF_THE_MESH;
-        self.start_from(&found.point, &found.multipliers, &found.bound_multipliers)
+        way.jumped |= found.at.point.distance(&self.last.point) > SMOOTH * moved + OF_THE_MESH;
+        self.start_from(&found.at)
     }
 
     /// Takes over a minimum; false where it is none that can be followed.
-    fn start_from(
-        &mut self,
-        point: &P::Point,
-        multipliers: &[Rows],
-        bound_multipliers: &Bounds,
-    ) -> bool {
+    fn start_from(&mut self, minimum: &Stationary<P::Point>) -> bool {
         let state = &mut self.state;
-        state.point.copy_from(point);
-        state.multipliers.copy_from_slice(multipliers);
-        state.bound_multipliers.copy_from_slice(bound_multipliers);
+        state.point.copy_from(&minimum.point);
+        state.multipliers.copy_from_slice(&minimum.multipliers);
+        state
+            .bound_multipliers
+            .copy_from_slice(&minimum.bound_multipliers);
         let admissible = state.program.evaluate(&mut state.point, &mut state.values);
         state.linearise();
         let (_, kept) = self.correct(f64::INFINITY);
@@ -224,10 +200,12 @@ where
         let state = &mut self.state;
         let inertia = state.inertia();
         let solution = Solution {
-            point: state.point.clone(),
+            at: Stationary {
+                point: state.point.clone(),
+                multipliers: state.multipliers.clone(),
+                bound_multipliers: state.bound_multipliers.clone(),
+            },
             values: state.values.clone(),
-            multipliers: state.multipliers.clone(),
-            bound_multipliers: state.bound_multipliers.clone(),
             residuals,
             iterations: 0,
             outcome: Outcome::Converged,

@@ -5,7 +5,7 @@ use super::filter::{Filter, Measure};
 use super::newton::Newton;
 use super::{
     BOUNDS, Bounds, Inertia, Linearisation, Outcome, Program, Residuals, Rows, Settings, Solution,
-    Values, add_controls, larger,
+    Stationary, Values, add_controls, larger,
 };
 use std::ops::ControlFlow;
 
@@ -20,6 +20,28 @@ pub fn minimise<P: Program>(
 ) -> Solution<P::Point> {
     let mut state = State::new(program, *settings, start);
     let outcome = state.iterate(proceed);
+    state.finish(outcome)
+}
+
+/// What a stationary point that was found by other means is worth.
+pub fn assess<P: Program>(
+    program: &P,
+    tolerance: f64,
+    at: &Stationary<P::Point>,
+) -> Solution<P::Point> {
+    let settings = Settings {
+        tolerance,
+        iterations: 0,
+        barrier: 0.0,
+    };
+    let mut state = State::new(program, settings, at.point.clone());
+    state.multipliers.clone_from(&at.multipliers);
+    state.bound_multipliers.clone_from(&at.bound_multipliers);
+    state.linearise();
+    let outcome = match state.residuals().largest() <= tolerance {
+        true => Outcome::Converged,
+        false => Outcome::IterationLimit,
+    };
     state.finish(outcome)
 }
 
@@ -151,10 +173,12 @@ impl<P: Program> State<P> {
         let inertia = self.inertia();
         Solution {
             residuals,
-            point: self.point,
+            at: Stationary {
+                point: self.point,
+                multipliers: self.multipliers,
+                bound_multipliers: self.bound_multipliers,
+            },
             values: self.values,
-            multipliers: self.multipliers,
-            bound_multipliers: self.bound_multipliers,
             iterations: self.iteration,
             outcome,
             inertia,
@@ -674,7 +698,7 @@ mod tests {
         assert_eq!(solution.outcome, Outcome::Converged);
         assert!(solution.residuals.largest() <= 1e-9);
         // From rest the push rises as steeply as it may, to means of 1/4 and 3/4; the other six share the rest.
-        let push: Vec<f64> = solution.point.push.iter().map(|push| push[0]).collect();
+        let push: Vec<f64> = solution.at.point.push.iter().map(|push| push[0]).collect();
         let means: Vec<f64> = push
             .windows(2)
             .map(|pair| 0.5 * (pair[0] + pair[1]))
@@ -685,7 +709,7 @@ mod tests {
         {
             assert!((mean - expected).abs() < 1e-5, "{means:?}");
         }
-        assert!((solution.point.position[STAGES] - 1.0).abs() < 1e-9);
+        assert!((solution.at.point.position[STAGES] - 1.0).abs() < 1e-9);
     }
 
     #[test]
@@ -699,7 +723,7 @@ mod tests {
         };
         let (below, here, above) = (least(0.999), least(1.0), least(1.001));
         let slope = (above.values.objective - below.values.objective) / 0.002;
-        assert!((slope + here.multipliers[1][0]).abs() < 1e-5 * slope.abs());
+        assert!((slope + here.at.multipliers[1][0]).abs() < 1e-5 * slope.abs());
     }
 
     #[test]
@@ -712,12 +736,12 @@ mod tests {
         let (held, tied) = (solved(&cart(None)), solved(&cart(Some([0, STAGES]))));
         assert_eq!(tied.outcome, Outcome::Converged);
         assert!((held.values.objective - tied.values.objective).abs() < 1e-9);
-        assert!((held.multipliers[1][0] - tied.multipliers[2][0]).abs() < 1e-6);
+        assert!((held.at.multipliers[1][0] - tied.at.multipliers[2][0]).abs() < 1e-6);
         let inner = solved(&Cart {
             goal: 0.5,
             ..cart(Some([3, 6]))
         });
-        let gap = inner.point.position[6] - inner.point.position[3];
+        let gap = inner.at.point.position[6] - inner.at.point.position[3];
         assert_eq!(inner.outcome, Outcome::Converged);
         assert!((gap - 0.5).abs() < 1e-9);
     }

@@ -2,7 +2,10 @@
 
 use super::chain::{NodeVector, TooConcave};
 use super::newton::Newton;
-use super::{BOUNDS, Bounds, Linearisation, Program, Rows, Values, add_controls, larger};
+use super::{
+    BOUNDS, Bounds, Linearisation, Program, Residuals, Rows, Stationary, Values, add_controls,
+    larger,
+};
 use nalgebra::{Matrix6, SVector, Vector2, Vector4};
 
 /// Most times that the solution of the system is improved by what it misses.
@@ -33,6 +36,9 @@ pub struct Kkt {
     /// Multiplier over slack of every bound in use; 0 of the others.
     stiffness: Bounds,
     metric: Vec<Matrix6<f64>>,
+    values: Values,
+    weights: Vec<f64>,
+    negative: usize,
 }
 
 /// A vector of the system: its right-hand side, or its solution.
@@ -57,11 +63,9 @@ impl Kkt {
     /// Errors: [`Singular`] where the second variation is not positive.
     pub fn factorise<P: Program>(
         program: &P,
-        point: &mut P::Point,
-        multipliers: &[Rows],
-        bounds: &Bounds,
+        at: &mut Stationary<P::Point>,
     ) -> Result<Self, Singular> {
-        let mut kkt = Self::assemble(program, point, multipliers, bounds)?;
+        let mut kkt = Self::evaluate(program, at)?;
         let factorised = kkt.newton.factorise_damped(&kkt.linear, 0.0);
         factorised.map_err(|TooConcave| Singular)?;
         Ok(kkt)
@@ -72,27 +76,31 @@ impl Kkt {
     /// Errors: [`Singular`] where the second variation vanishes in some direction.
     pub fn factorise_any<P: Program>(
         program: &P,
-        point: &mut P::Point,
-        multipliers: &[Rows],
-        bounds: &Bounds,
+        at: &mut Stationary<P::Point>,
     ) -> Result<Self, Singular> {
-        let mut kkt = Self::assemble(program, point, multipliers, bounds)?;
+        let mut kkt = Self::evaluate(program, at)?;
         kkt.linear.hold_idle_controls();
         kkt.refactorise()?;
         Ok(kkt)
     }
 
-    /// The system, not factorised yet.
-    fn assemble<P: Program>(
-        program: &P,
-        point: &mut P::Point,
-        multipliers: &[Rows],
-        bounds: &Bounds,
-    ) -> Result<Self, Singular> {
+    /// The system at a point of the domain, not factorised yet.
+    fn evaluate<P: Program>(program: &P, at: &mut Stationary<P::Point>) -> Result<Self, Singular> {
         let mut values = Values::default();
-        if !program.evaluate(point, &mut values) {
-            return Err(Singular);
+        let is_admissible = program.evaluate(&mut at.point, &mut values);
+        match is_admissible {
+            true => Ok(Self::assemble(program, at, values)),
+            false => Err(Singular),
         }
+    }
+
+    /// The system at a point with some values, not factorised yet.
+    fn assemble<P: Program>(program: &P, at: &Stationary<P::Point>, values: Values) -> Self {
+        let Stationary {
+            point,
+            multipliers,
+            bound_multipliers: bounds,
+        } = at;
         let mut linear = Linearisation::new(program);
         program.linearise(point, multipliers, bounds, &mut linear);
         let (pairs, used) = (program.linked_nodes(), program.bounds());
@@ -104,18 +112,97 @@ impl Kkt {
                 *stiffness = bounds[k][b] / values.slacks[k][b];
             }
         }
-        Ok(Self {
+        Self {
             linear,
             newton,
             pairs,
             stiffness,
             metric: program.metric(point),
-        })
+            values,
+            weights: program.weights(),
+            negative: 0,
+        }
+    }
+
+    /// What the first-order conditions miss where the system was factorised, with slacks times multipliers to become
+    /// `barrier` times the stage's weight: minus the right-hand side of Newton's step.
+    pub(super) fn conditions(&self, bounds: &Bounds, barrier: f64) -> KktVector {
+        let mut missed = self.zero();
+        missed.nodes.copy_from_slice(&self.linear.gradient);
+        missed.constraints.clone_from(&self.values.constraints);
+        for (k, multipliers) in bounds.iter().enumerate() {
+            for (b, multiplier) in multipliers.iter().enumerate() {
+                if self.stiffness[k][b] != 0.0 {
+                    let pull = -*multiplier * self.linear.slacks[k][b];
+                    add_controls(&mut missed.nodes, k, &pull);
+                    missed.bounds[k][b] =
+                        self.values.slacks[k][b] - barrier * self.weights[k] / multiplier;
+                }
+            }
+        }
+        self.linear.chain.fold(&mut missed.nodes);
+        missed
+    }
+
+    /// What the first-order conditions of a programme miss at a point that may lie a little outside its bounds, slacks for
+    /// themselves; `None` where they cannot be told.
+    pub(super) fn conditions_of<P: Program>(
+        program: &P,
+        at: &Stationary<P::Point>,
+    ) -> Option<KktVector> {
+        let mut at = at.clone();
+        let mut values = Values::default();
+        program.evaluate(&mut at.point, &mut values);
+        if values.constraints.is_empty() {
+            return None;
+        }
+        let kkt = Self::assemble(program, &at, values);
+        let conditions = kkt.conditions(&at.bound_multipliers, 0.0);
+        let is_finite = conditions
+            .nodes
+            .iter()
+            .all(|node| node.iter().all(|x| x.is_finite()));
+        is_finite.then_some(conditions)
+    }
+
+    /// Moves the entries of controls that follow others to these, and drops those that are held.
+    pub(super) fn fold(&self, vector: &mut KktVector) {
+        self.linear.chain.carry_back(&mut vector.nodes);
+        self.linear.chain.fold(&mut vector.nodes);
+    }
+
+    /// Residuals of what the conditions miss.
+    pub(super) fn residuals(&self, missed: &KktVector, bounds: &Bounds) -> Residuals {
+        let mut complementarity: f64 = 0.0;
+        for (k, multipliers) in bounds.iter().enumerate() {
+            for (b, multiplier) in multipliers.iter().enumerate() {
+                if self.stiffness[k][b] != 0.0 {
+                    let product = multiplier * self.values.slacks[k][b];
+                    complementarity = larger(complementarity, product.abs());
+                }
+            }
+        }
+        Residuals {
+            stationarity: largest(&missed.nodes),
+            constraint: largest(&missed.constraints),
+            complementarity,
+        }
+    }
+
+    /// Values where the system was factorised.
+    pub(super) fn values(&self) -> &Values {
+        &self.values
+    }
+
+    /// In how many of the directions that the constraints leave the second variation is negative.
+    pub(super) fn negative(&self) -> usize {
+        self.negative
     }
 
     fn refactorise(&mut self) -> Result<(), Singular> {
         let factorised = self.newton.factorise_any(&self.linear);
-        factorised.map_err(|TooConcave| Singular)
+        self.negative = factorised.map_err(|TooConcave| Singular)?;
+        Ok(())
     }
 
     /// Takes a multiple of the metric off the second derivatives and factorises the system again; in how many directions,
@@ -125,10 +212,8 @@ impl Kkt {
     pub(super) fn shift(&mut self, by: f64) -> Result<usize, Singular> {
         self.linear.diagonal.shift(&self.metric, by);
         self.newton.shift(&self.metric, by);
-        let negative = self.newton.count_negative(&self.linear);
-        let negative = negative.map_err(|TooConcave| Singular)?;
         self.refactorise()?;
-        Ok(negative)
+        Ok(self.negative)
     }
 
     /// The pull of the metric on motions: its product with them.
@@ -158,6 +243,28 @@ impl Kkt {
     ///
     /// Errors: [`Singular`] where the constraints cannot change as asked.
     pub fn solve(&mut self, right: &KktVector) -> Result<KktVector, Singular> {
+        let (found, last, missed) = self.improve(right);
+        let size = largest(&found.nodes).max(NOTHING * largest(&right.nodes));
+        let moved = size.max(largest(&right.constraints)).max(f64::MIN_POSITIVE);
+        let is_met = largest(&missed.constraints) <= CLEARLY * moved;
+        match last <= CLEARLY && is_met {
+            true => Ok(found),
+            false => Err(Singular),
+        }
+    }
+
+    /// Solves the system as well as can be, however near to singular it is: for what is improved on later.
+    ///
+    /// Errors: [`Singular`] where nothing finite comes out.
+    pub(super) fn solve_nearly(&mut self, right: &KktVector) -> Result<KktVector, Singular> {
+        let (found, ..) = self.improve(right);
+        let is_finite =
+            largest(&found.nodes).is_finite() && largest(&found.constraints).is_finite();
+        is_finite.then_some(found).ok_or(Singular)
+    }
+
+    /// The solution, improved until that is not worth while; the share of the last improvement, and what is still missed.
+    fn improve(&mut self, right: &KktVector) -> (KktVector, f64, KktVector) {
         let mut found = self.zero();
         self.pull_by_stiffness(right, &mut found.bounds);
         let mut missed = self.missed(right, &found);
@@ -178,12 +285,7 @@ impl Kkt {
                 break;
             }
         }
-        let moved = size(&found.nodes).max(largest(&right.constraints));
-        let is_met = largest(&missed.constraints) <= CLEARLY * moved;
-        match last <= CLEARLY && is_met {
-            true => Ok(found),
-            false => Err(Singular),
-        }
+        (found, last, missed)
     }
 
     /// What the changes of the slacks alone do to the bounds' multipliers.
@@ -269,6 +371,32 @@ impl Kkt {
         for (k, own) in diagonal.states.iter().enumerate() {
             let mut by_state = into[k].fixed_rows_mut::<6>(0);
             by_state += own * step[k].fixed_rows::<6>(0);
+        }
+    }
+}
+
+impl KktVector {
+    /// Adds a multiple of another.
+    pub fn add(&mut self, factor: f64, other: &Self) {
+        for (own, other) in self.nodes.iter_mut().zip(&other.nodes) {
+            *own += factor * other;
+        }
+        for (own, other) in self.constraints.iter_mut().zip(&other.constraints) {
+            *own += factor * other;
+        }
+        for (own, other) in self.bounds.iter_mut().zip(&other.bounds) {
+            for (own, other) in own.iter_mut().zip(other) {
+                *own += factor * other;
+            }
+        }
+    }
+
+    /// Multiplies it by a factor.
+    pub fn scale(&mut self, factor: f64) {
+        self.nodes.iter_mut().for_each(|node| *node *= factor);
+        self.constraints.iter_mut().for_each(|rows| *rows *= factor);
+        for bounds in &mut self.bounds {
+            bounds.iter_mut().for_each(|bound| *bound *= factor);
         }
     }
 }

@@ -7,6 +7,7 @@
 
 mod border;
 pub mod chain;
+mod continuation;
 mod filter;
 mod follow;
 mod inertia;
@@ -14,11 +15,13 @@ mod interior_point;
 mod kkt;
 mod modes;
 mod newton;
+mod push;
 mod rank;
 
+pub use continuation::{Continuation, Curve, End, Event, Family, Pace, Station, Turn};
 pub use follow::{Followed, Follower, Shape};
 pub use inertia::Inertia;
-pub use interior_point::minimise;
+pub use interior_point::{assess, minimise};
 pub use kkt::{Kkt, KktVector, Singular};
 pub use modes::{Mode, lowest_modes};
 pub use rank::dependent_constraints;
@@ -89,7 +92,8 @@ pub trait Program {
     /// The share of each stage in the whole, its weight in barrier and damping.
     fn weights(&self) -> Vec<f64>;
 
-    /// Carries the states of a point along the chain and evaluates it; false outside the domain.
+    /// Carries the states of a point along the chain and evaluates it; false outside the domain. Outside the bounds alone
+    /// it still gives slacks and constraints.
     fn evaluate(&self, point: &mut Self::Point, values: &mut Values) -> bool;
 
     /// Derivatives of the constraints at nodes.
@@ -230,17 +234,24 @@ fn larger(a: f64, b: f64) -> f64 {
     if b <= a { a } else { b }
 }
 
-/// Where the minimisation ended.
-#[derive(Debug, Clone)]
-pub struct Solution<P> {
-    /// The last point.
+/// A point where the first-order conditions hold, or are meant to, with the multipliers that they take.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stationary<P> {
+    /// The point.
     pub point: P,
-    /// Its values.
-    pub values: Values,
     /// Multipliers of the constraints, in the order of their values.
     pub multipliers: Vec<Rows>,
     /// Multipliers of the inequalities.
     pub bound_multipliers: Bounds,
+}
+
+/// Where the minimisation ended.
+#[derive(Debug, Clone)]
+pub struct Solution<P> {
+    /// The last point, with its multipliers.
+    pub at: Stationary<P>,
+    /// Its values.
+    pub values: Values,
     /// Residuals there.
     pub residuals: Residuals,
     /// Iterations taken.

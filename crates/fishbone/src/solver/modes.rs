@@ -1,7 +1,7 @@
 //! Eigenvectors of the second variation, the lowest ones.
 
 use super::chain::NodeVector;
-use super::{Bounds, Kkt, Program, Rows, Singular};
+use super::{Kkt, Program, Singular, Stationary};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 /// A direction that the constraints leave, in which the second variation is a multiple of the metric.
@@ -11,6 +11,8 @@ pub struct Mode {
     pub eigenvalue: f64,
     /// Motion of every node, of norm 1 in the metric.
     pub motion: Vec<NodeVector>,
+    /// The metric's pull on it.
+    pub pull: Vec<NodeVector>,
 }
 
 /// The lowest modes at a solution, rising; fewer than `count` where there are no more.
@@ -20,20 +22,22 @@ pub struct Mode {
 /// Errors: [`Singular`] where that cannot be factorised.
 pub fn lowest_modes<P: Program>(
     program: &P,
-    point: &mut P::Point,
-    multipliers: &[Rows],
-    bounds: &Bounds,
+    at: &mut Stationary<P::Point>,
     count: usize,
 ) -> Result<Vec<Mode>, Singular> {
+    lowest_modes_of(Kkt::factorise_any(program, at)?, count)
+}
+
+/// The same of a system that has been factorised.
+pub(super) fn lowest_modes_of(mut kkt: Kkt, count: usize) -> Result<Vec<Mode>, Singular> {
     const GUARDS: usize = 4;
     const ITERATIONS: usize = 100;
     const SETTLED: f64 = 1e-12;
-    let mut kkt = Kkt::factorise_any(program, point, multipliers, bounds)?;
     let shift = shift_below_all(&mut kkt)?;
     let mut subspace = first_guess(&kkt, count + GUARDS);
     let mut last = vec![f64::INFINITY; count];
     for _ in 0..ITERATIONS {
-        let pulls: Vec<_> = subspace.iter().map(|mode| kkt.pull(&mode.motion)).collect();
+        let pulls: Vec<_> = subspace.iter().map(|mode| mode.pull.clone()).collect();
         let motions = answers(&mut kkt, &pulls)?;
         subspace = ritz(&kkt, &motions, &pulls, shift);
         let now: Vec<f64> = subspace
@@ -82,9 +86,13 @@ fn first_guess(kkt: &Kkt, count: usize) -> Vec<Mode> {
         };
         (0..zero.len()).map(at).collect()
     };
-    let guess = |mode| Mode {
-        eigenvalue: 0.0,
-        motion: motion(mode),
+    let guess = |mode| {
+        let motion: Vec<_> = motion(mode);
+        Mode {
+            eigenvalue: 0.0,
+            pull: kkt.pull(&motion),
+            motion,
+        }
     };
     (0..count).map(guess).collect()
 }
@@ -134,9 +142,13 @@ fn ritz(
     let mut order: Vec<usize> = (0..kept.len()).collect();
     order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
     let coefficients = &basis * &eigen.eigenvectors;
-    let mode = |of: usize| Mode {
-        eigenvalue: eigen.eigenvalues[of] + shift,
-        motion: combine(motions, coefficients.column(of).iter().copied()),
+    let mode = |of: usize| {
+        let coefficients = coefficients.column(of);
+        Mode {
+            eigenvalue: eigen.eigenvalues[of] + shift,
+            motion: combine(motions, coefficients.iter().copied()),
+            pull: combine(&own, coefficients.iter().copied()),
+        }
     };
     order.into_iter().map(mode).collect()
 }

@@ -1,6 +1,6 @@
 //! The Newton system of a barrier problem: bounds eliminated, inertia controlled, constraints met exactly.
 
-use super::border::{Border, count_negative};
+use super::border::Border;
 use super::chain::{Diagonal, Factor, NodeVector, TooConcave};
 use super::{BOUNDS, Bounds, Linearisation, Rows, RowsByNode, Values, larger};
 
@@ -18,6 +18,8 @@ pub(super) struct Newton {
     stiffness: Bounds,
     pub(super) factor: Factor,
     border: Border,
+    /// All constraints as rows of a border, where they are so.
+    rigid: Option<(Border, Vec<[RowsByNode; 2]>)>,
     weights: Vec<f64>,
     bounds: usize,
     node_weights: Vec<f64>,
@@ -46,6 +48,7 @@ impl Newton {
             factor: Factor::new(weights.len()),
             multiplier_step: vec![Rows::zeros(); linear.constraints.len() + pairs.len()],
             border: Border::new(pairs, nodes),
+            rigid: None,
             node_weights: (0..nodes)
                 .map(|k| half(k.checked_sub(1)) + half(Some(k)))
                 .collect(),
@@ -118,31 +121,31 @@ impl Newton {
         linear: &Linearisation,
         damping: f64,
     ) -> Result<(), TooConcave> {
-        match self.factorise_concave(linear, damping, self.border.rows())? {
-            0 => Ok(()),
-            _ => Err(TooConcave),
-        }
-    }
-
-    /// Factorises, however concave.
-    ///
-    /// Errors: [`TooConcave`] where there is a direction of no curvature.
-    pub(super) fn factorise_any(&mut self, linear: &Linearisation) -> Result<(), TooConcave> {
-        self.factorise_concave(linear, 0.0, usize::MAX).map(drop)
-    }
-
-    /// Factorises a chain that is concave in so many directions at most; in how many of them the links leave it so.
-    fn factorise_concave(
-        &mut self,
-        linear: &Linearisation,
-        damping: f64,
-        most: usize,
-    ) -> Result<usize, TooConcave> {
-        let (chain, factor) = (&linear.chain, &mut self.factor);
+        self.rigid = None;
+        let (chain, factor, most) = (&linear.chain, &mut self.factor, self.border.rows());
         let concave = chain.factorise(&self.diagonal, damping, &self.node_weights, most, factor)?;
         let held = self
             .border
             .factorise(chain, factor, &linear.links, COMPLIANCE)?;
+        match concave == held {
+            true => Ok(()),
+            false => Err(TooConcave),
+        }
+    }
+
+    /// Factorises, however concave; in how many of the directions that the constraints leave it is negative.
+    ///
+    /// The springs that stand for the constraints could not be made rigid by pulling again where the second derivative all
+    /// but vanishes in some direction. So the constraints are rows of the border here.
+    ///
+    /// Errors: [`TooConcave`] where the chain has a direction of no curvature.
+    pub(super) fn factorise_any(&mut self, linear: &Linearisation) -> Result<usize, TooConcave> {
+        let (chain, factor) = (&linear.chain, &mut self.factor);
+        let most = usize::MAX;
+        let concave = chain.factorise(&self.diagonal, 0.0, &self.node_weights, most, factor)?;
+        let (mut border, rows) = self.border.with_nodes(&self.diagonal.nodes, linear);
+        let held = border.factorise(chain, factor, &rows, 0.0)?;
+        self.rigid = Some((border, rows));
         Ok(concave.saturating_sub(held))
     }
 
@@ -159,9 +162,8 @@ impl Newton {
         if concave == 0 {
             return Ok(0);
         }
-        let (mut constraints, rows) = self.border.with_nodes(&self.diagonal.nodes, linear);
-        let give = constraints.give(chain, factor, &rows, 0.0);
-        Ok(concave.saturating_sub(count_negative(&give)))
+        let (mut border, rows) = self.border.with_nodes(&self.diagonal.nodes, linear);
+        Ok(concave.saturating_sub(border.factorise(chain, factor, &rows, 0.0)?))
     }
 
     /// Finds the step of least cost whose constraints change by `−targets`, and the multipliers' step.
@@ -174,6 +176,11 @@ impl Newton {
         gradient: &[NodeVector],
         targets: &[Rows],
     ) {
+        if let Some((border, rows)) = self.rigid.take() {
+            self.solve_rigidly(linear, &border, &rows, gradient, targets);
+            self.rigid = Some((border, rows));
+            return;
+        }
         let (at_nodes, between) = targets.split_at(linear.constraints.len());
         self.right.copy_from_slice(gradient);
         self.step.fill(NodeVector::zeros());
@@ -201,6 +208,30 @@ impl Newton {
                 break;
             }
             self.right.fill(NodeVector::zeros());
+        }
+    }
+
+    /// The same where all constraints are rows of a border.
+    fn solve_rigidly(
+        &mut self,
+        linear: &Linearisation,
+        border: &Border,
+        rows: &[[RowsByNode; 2]],
+        gradient: &[NodeVector],
+        targets: &[Rows],
+    ) {
+        self.right.copy_from_slice(gradient);
+        for (i, target) in targets.iter().enumerate().take(linear.constraints.len()) {
+            let pull = linear.constraints[i].tr_mul(target) / COMPLIANCE;
+            self.right[self.diagonal.nodes[i].node] += pull;
+        }
+        let (chain, factor) = (&linear.chain, &mut self.factor);
+        chain.solve(factor, &self.right, &mut self.step);
+        let forces = border.correct(rows, targets, &mut self.step);
+        self.multiplier_step.copy_from_slice(&forces);
+        for (i, target) in targets.iter().enumerate().take(linear.constraints.len()) {
+            let missing = self.missing(linear, i, target);
+            self.multiplier_step[i] += missing / COMPLIANCE;
         }
     }
 

@@ -1,0 +1,424 @@
+//! The equilibria along a path, stable or not: where they fold, where others branch off, and what the belt snaps to.
+
+use crate::equilibrium::{Equilibrium, Status, of_solution, program_of};
+use crate::path::Path;
+use crate::program::{BeltPoint, BeltProgram};
+use crate::scenario::Scenario;
+use crate::solver::{
+    self, Continuation, Curve, Family, Pace, Residuals, Shape, Station, Stationary, Turn,
+};
+use crate::twins::are_twins;
+use nalgebra::Vector3;
+use std::ops::ControlFlow;
+use thiserror::Error;
+
+pub use crate::solver::End;
+
+/// Why there is nothing to follow.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum NoBranch {
+    /// The method of the solve has no first-order conditions that it meets.
+    #[error("the source's method cannot be followed: use solver.method = \"intrinsic\"")]
+    NoMultipliers,
+    /// There is no equilibrium to begin with.
+    #[error("there is nothing to follow: {0}")]
+    NotConverged(String),
+    /// The equilibrium has no single continuation.
+    #[error("the equilibrium may move at no cost of energy: there is no one branch to follow")]
+    Singular,
+}
+
+/// How far to look. Lengths along a branch count the parameter of the path, from 0 to its length, and the motion of the belt
+/// in U alike.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Longest step along a branch.
+    pub step: f64,
+    /// Most states of a branch.
+    pub states: usize,
+    /// Most branches.
+    pub branches: usize,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            step: 0.05,
+            states: 1000,
+            branches: 10,
+        }
+    }
+}
+
+/// The branches of equilibria that hang together along a path.
+#[derive(Debug, Clone)]
+pub struct Diagram {
+    /// The path.
+    pub path: Path,
+    /// The branches: first that of the equilibrium where the path begins, then those that branch off.
+    pub branches: Vec<Branch>,
+    elements: usize,
+    settings: Settings,
+}
+
+/// A curve of equilibria.
+#[derive(Debug, Clone)]
+pub struct Branch {
+    /// Where it begins: at the start of the path, or at an event of another branch.
+    pub origin: Option<Origin>,
+    /// Its states in order, those of its events among them.
+    pub states: Vec<State>,
+    /// Its events in order.
+    pub events: Vec<Event>,
+    /// Why it ends.
+    pub end: End,
+}
+
+/// Where a branch comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Origin {
+    /// The other branch.
+    pub branch: usize,
+    /// Which of its events.
+    pub event: usize,
+}
+
+/// An equilibrium of a branch.
+#[derive(Debug, Clone)]
+pub struct State {
+    /// How far along the path.
+    pub place: f64,
+    /// Number of independent motions along which the energy falls.
+    pub negative_modes: usize,
+    /// How far it is from a solution of its discrete equations.
+    pub residuals: Residuals,
+    at: Stationary<BeltPoint>,
+}
+
+/// What happens at an event.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// The branch turns back.
+    Fold,
+    /// Another branch crosses that is its own mirror image, or touches it to first order.
+    Pitchfork,
+    /// Another branch crosses at an angle.
+    Transcritical,
+    /// Other branches cross that could not be followed.
+    Bifurcation,
+}
+
+impl Kind {
+    /// Its name in results.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Fold => "fold",
+            Self::Pitchfork => "pitchfork",
+            Self::Transcritical => "transcritical",
+            Self::Bifurcation => "bifurcation",
+        }
+    }
+}
+
+/// A place on a branch where the number of negative modes changes.
+#[derive(Debug, Clone)]
+pub struct Event {
+    /// What happens there.
+    pub kind: Kind,
+    /// The state next to it.
+    pub state: usize,
+    /// How far along the path it is.
+    pub place: f64,
+    /// Negative modes before and after.
+    pub negative_modes: [usize; 2],
+    /// Where the belt goes when it is led past the loss of its stability.
+    pub snapped: Option<Snapped>,
+}
+
+/// The minimum downhill from where stability was lost.
+#[derive(Debug, Clone)]
+pub struct Snapped {
+    /// How far along the path, a little past the event.
+    pub place: f64,
+    /// The minimum.
+    pub equilibrium: Equilibrium,
+}
+
+/// The programmes of the scenarios along a path, all on the same mesh.
+struct Along<'a> {
+    path: &'a Path,
+    elements: usize,
+    nodes: usize,
+}
+
+impl Family for Along<'_> {
+    type Program = BeltProgram;
+
+    fn at(&self, place: f64) -> Option<BeltProgram> {
+        let program = program_of(&self.path.at(place)?, self.elements);
+        (program.pieces.len() + 1 == self.nodes).then_some(program)
+    }
+}
+
+/// Follows an equilibrium of the path's first scenario along the path.
+///
+/// `proceed` is asked once a step whether to go on, and told the branch and how far along the path it is.
+///
+/// # Errors
+///
+/// [`NoBranch`] unless it has converged, by a method that knows multipliers, to a single equilibrium.
+pub fn follow(
+    equilibrium: &Equilibrium,
+    path: &Path,
+    settings: &Settings,
+    proceed: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
+) -> Result<Diagram, NoBranch> {
+    let solved = equilibrium.solved.as_ref();
+    let solved = solved.ok_or(NoBranch::NoMultipliers)?;
+    if equilibrium.status != Status::Converged {
+        return Err(NoBranch::NotConverged(equilibrium.message.clone()));
+    }
+    let family = Along {
+        path,
+        elements: path.base().elements(),
+        nodes: solved.at.point.poses.len(),
+    };
+    let pace = Pace {
+        longest: settings.step,
+        stations: settings.states,
+        events: true,
+    };
+    let tolerance = path.base().solver.tolerance;
+    let continuation = Continuation::new(&family, tolerance, [0.0, path.length()], pace);
+    let start = continuation.start(&solved.at, 0.0, true);
+    let start = start.ok_or(NoBranch::Singular)?;
+    let mut search = Search {
+        continuation,
+        proceed,
+        diagram: Diagram {
+            path: path.clone(),
+            branches: Vec::new(),
+            elements: family.elements,
+            settings: *settings,
+        },
+    };
+    search.trace(None, start);
+    Ok(search.diagram)
+}
+
+/// A diagram in the making.
+struct Search<'a, 'b> {
+    continuation: Continuation<'a, Along<'a>>,
+    proceed: &'b mut dyn FnMut(usize, f64) -> ControlFlow<()>,
+    diagram: Diagram,
+}
+
+impl Search<'_, '_> {
+    /// Traces a branch, then those that branch off it.
+    fn trace(&mut self, origin: Option<Origin>, start: Station<BeltPoint>) {
+        let index = self.diagram.branches.len();
+        let curve = self
+            .continuation
+            .trace(start, &mut |place| (self.proceed)(index, place));
+        let Curve {
+            stations,
+            events,
+            end,
+        } = curve;
+        self.diagram.branches.push(Branch {
+            origin,
+            states: stations.iter().map(State::of).collect(),
+            events: Vec::new(),
+            end,
+        });
+        for (state, event) in events {
+            if end == End::Interrupted {
+                return;
+            }
+            let crossing = self.crossing(&event);
+            let onwards = (event.parameter - stations[state - 1].parameter).signum();
+            let snapped = match event.negative {
+                [0, _] => self.snapped(&event, &crossing, onwards),
+                _ => None,
+            };
+            let events = &mut self.diagram.branches[index].events;
+            let origin = Origin {
+                branch: index,
+                event: events.len(),
+            };
+            events.push(Event {
+                kind: kind(&event, &crossing),
+                state,
+                place: event.parameter,
+                negative_modes: event.negative,
+                snapped,
+            });
+            for side in self.different(crossing) {
+                let is_known = self.diagram.passes_through(&side, index);
+                if !is_known && self.diagram.branches.len() < self.diagram.settings.branches {
+                    let away = self.away(&side, event.parameter);
+                    if let Some(away) = away {
+                        self.trace(Some(origin), away);
+                    }
+                }
+            }
+        }
+    }
+
+    /// The stations of other branches that cross at an event, a little before it or beyond.
+    ///
+    /// From beside the event a push along the mode that is about to vanish leads over to them.
+    fn crossing(&mut self, event: &solver::Event<BeltPoint>) -> Vec<Station<BeltPoint>> {
+        const BESIDE: [f64; 3] = [2e-3, 5e-4, 1e-2];
+        /// Farther off it is none that crosses there.
+        const NEAR: f64 = 0.2;
+        if event.turn == Turn::Fold {
+            return Vec::new();
+        }
+        for by in BESIDE {
+            let mut found = Vec::new();
+            for by in [by, -by] {
+                let Some(beside) = self.continuation.beside(event, by) else {
+                    continue;
+                };
+                let proceed = &mut |_| (self.proceed)(self.diagram.branches.len(), event.parameter);
+                let others = self.continuation.others(&beside, &event.mode, proceed);
+                let near =
+                    |other: &Station<BeltPoint>| other.at.point.distance(&beside.at.point) < NEAR;
+                found.extend(others.into_iter().flatten().flatten().filter(near));
+            }
+            if !found.is_empty() {
+                return found;
+            }
+        }
+        Vec::new()
+    }
+
+    /// The same station, the branch heading away from where it crosses another.
+    fn away(&self, station: &Station<BeltPoint>, place: f64) -> Option<Station<BeltPoint>> {
+        let rising = station.parameter > place;
+        self.continuation
+            .start(&station.at, station.parameter, rising)
+    }
+
+    /// Of two that are mirror images the one that bulges as the scenario asks; else all.
+    fn different(&self, stations: Vec<Station<BeltPoint>>) -> Vec<Station<BeltPoint>> {
+        let bulge = Vector3::from(self.diagram.path.base().solver.bulge);
+        let reach = |station: &Station<BeltPoint>| {
+            let poses = station.at.point.poses.iter();
+            let reach = poses.map(|pose| pose.position.dot(&bulge));
+            reach.fold(f64::NEG_INFINITY, f64::max)
+        };
+        let mut different: Vec<Station<BeltPoint>> = Vec::new();
+        for station in stations {
+            let is_twin = |other: &&mut Station<BeltPoint>| {
+                are_twins(&other.at.point.poses, &station.at.point.poses)
+            };
+            match different.iter_mut().find(is_twin) {
+                Some(twin) if reach(&station) > reach(twin) => *twin = station,
+                Some(_) => (),
+                None => different.push(station),
+            }
+        }
+        different
+    }
+
+    /// Where the belt goes that is led on past an event.
+    fn snapped(
+        &mut self,
+        event: &solver::Event<BeltPoint>,
+        crossing: &[Station<BeltPoint>],
+        onwards: f64,
+    ) -> Option<Snapped> {
+        const PAST: f64 = 1e-4;
+        let place = event.parameter + PAST * onwards;
+        let beyond = |station: &&Station<BeltPoint>| {
+            station.negative == 0 && (station.parameter - event.parameter) * onwards > 0.0
+        };
+        let from = crossing.iter().find(beyond).unwrap_or(&event.station);
+        let proceed = &mut || (self.proceed)(0, place);
+        let found = self
+            .continuation
+            .descend(from, &event.mode, place, proceed)?;
+        let scenario = self.diagram.path.at(place)?;
+        let program = program_of(&scenario, self.diagram.elements);
+        Some(Snapped {
+            place,
+            equilibrium: of_solution(&scenario, program, found),
+        })
+    }
+}
+
+/// What an event is, by where the other branches are.
+fn kind(event: &solver::Event<BeltPoint>, crossing: &[Station<BeltPoint>]) -> Kind {
+    let beyond = |station: &&Station<BeltPoint>| station.parameter > event.parameter;
+    match (event.turn, crossing.iter().filter(beyond).count()) {
+        (Turn::Fold, _) => Kind::Fold,
+        (Turn::Bifurcation, _) if crossing.is_empty() => Kind::Bifurcation,
+        (Turn::Bifurcation, 1) if crossing.len() == 2 => Kind::Transcritical,
+        (Turn::Bifurcation, _) => Kind::Pitchfork,
+    }
+}
+
+impl State {
+    fn of(station: &Station<BeltPoint>) -> Self {
+        Self {
+            place: station.parameter,
+            negative_modes: station.negative,
+            residuals: station.residuals,
+            at: station.at.clone(),
+        }
+    }
+}
+
+impl Diagram {
+    /// The scenario of a state.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such state.
+    pub fn scenario(&self, branch: usize, state: usize) -> Scenario {
+        let place = self.branches[branch].states[state].place;
+        let mut scenario = self.path.at(place).expect("it was solved there");
+        scenario.solver.elements = Some(self.elements);
+        scenario
+    }
+
+    /// All that is to be known of a state.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such state.
+    pub fn equilibrium(&self, branch: usize, state: usize) -> Equilibrium {
+        let scenario = self.scenario(branch, state);
+        let program = program_of(&scenario, self.elements);
+        let at = &self.branches[branch].states[state].at;
+        let solution = solver::assess(&program, scenario.solver.tolerance, at);
+        of_solution(&scenario, program, solution)
+    }
+
+    /// Whether a branch other than one that is excepted passes through a station.
+    fn passes_through(&self, station: &Station<BeltPoint>, except: usize) -> bool {
+        let near = 0.6 * self.settings.step;
+        let is_near = |state: &State| {
+            let same_place = (state.place - station.parameter).abs() < near;
+            let way =
+                |(a, b): (&crate::lie::Pose, &crate::lie::Pose)| (a.position - b.position).norm();
+            let ways = state
+                .at
+                .point
+                .poses
+                .iter()
+                .zip(&station.at.point.poses)
+                .map(way);
+            same_place && ways.fold(0.0, f64::max) < near
+        };
+        let others = self
+            .branches
+            .iter()
+            .enumerate()
+            .filter(|(index, _)| *index != except);
+        others.flat_map(|(_, branch)| &branch.states).any(is_near)
+    }
+}

@@ -1,0 +1,644 @@
+//! Pseudo-arclength continuation: the curve of stationary points, minima or not, of a family of programmes.
+//!
+//! Every step goes along the tangent and is corrected by Newton's method square to it, so that the curve may turn back in the
+//! parameter. Where the inertia of the second variation changes, the place is found: a fold, where the parameter turns back,
+//! or a bifurcation, where another curve crosses.
+//!
+//! Source of the method: H. B. Keller, "Numerical solution of bifurcation and nonlinear eigenvalue problems" (1977).
+
+use super::chain::NodeVector;
+use super::kkt::KktVector;
+use super::modes::lowest_modes_of;
+use super::push::pushed_over;
+use super::{BOUNDS, Kkt, Program, Residuals, Settings, Stationary, Values, minimise};
+use super::{Mode, Solution};
+use std::ops::ControlFlow;
+
+/// Programmes by one parameter.
+pub trait Family {
+    /// What they are.
+    type Program: Program;
+
+    /// The programme at a value of the parameter; `None` where there is none.
+    fn at(&self, parameter: f64) -> Option<Self::Program>;
+}
+
+/// A stationary point on a curve.
+#[derive(Debug, Clone)]
+pub struct Station<X> {
+    /// Parameter of its programme.
+    pub parameter: f64,
+    /// The point.
+    pub at: Stationary<X>,
+    /// Objective there.
+    pub objective: f64,
+    /// Residuals there.
+    pub residuals: Residuals,
+    /// Number of negative eigenvalues of the second variation.
+    pub negative: usize,
+    /// Which way the curve goes on.
+    tangent: Tangent,
+}
+
+/// A direction along a curve, of length 1.
+#[derive(Debug, Clone)]
+struct Tangent {
+    motion: KktVector,
+    /// The metric's pull on it.
+    pull: Vec<NodeVector>,
+    parameter: f64,
+}
+
+/// What happens where the inertia changes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Turn {
+    /// The parameter turns back.
+    Fold,
+    /// Another curve crosses, or several.
+    Bifurcation,
+}
+
+/// A place on a curve where the second variation is singular.
+#[derive(Debug, Clone)]
+pub struct Event<X> {
+    /// What happens.
+    pub turn: Turn,
+    /// Parameter at the place.
+    pub parameter: f64,
+    /// The station next to the place.
+    pub station: Station<X>,
+    /// Negative eigenvalues before and after.
+    pub negative: [usize; 2],
+    /// The direction in which the second variation vanishes.
+    pub mode: Mode,
+}
+
+/// Why a curve ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum End {
+    /// The parameter has left its range.
+    Range,
+    /// The curve has come back to where it began.
+    Closed,
+    /// All stations that were allowed are used up.
+    Budget,
+    /// No step, however short, leads on.
+    Lost,
+    /// The caller asked to end.
+    Interrupted,
+}
+
+/// A stretch of a curve.
+#[derive(Debug, Clone)]
+pub struct Curve<X> {
+    /// Its stations in order; the events are among them.
+    pub stations: Vec<Station<X>>,
+    /// Its events in order, each with its place among the stations.
+    pub events: Vec<(usize, Event<X>)>,
+    /// Why it ended.
+    pub end: End,
+}
+
+/// Settings of a continuation. Lengths along the curve count the parameter like motion in the metric of the programme.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pace {
+    /// Longest step.
+    pub longest: f64,
+    /// Most stations of a curve.
+    pub stations: usize,
+    /// Whether to look for events.
+    pub events: bool,
+}
+
+/// Follows the stationary points of a family.
+pub struct Continuation<'a, F: Family> {
+    family: &'a F,
+    tolerance: f64,
+    range: [f64; 2],
+    pace: Pace,
+}
+
+type PointOf<F> = <<F as Family>::Program as Program>::Point;
+
+/// A shorter step is none.
+const SHORTEST: f64 = 1e-7;
+
+impl<'a, F: Family> Continuation<'a, F> {
+    /// Over a range of the parameter.
+    pub fn new(family: &'a F, tolerance: f64, range: [f64; 2], pace: Pace) -> Self {
+        Self {
+            family,
+            tolerance,
+            range,
+            pace,
+        }
+    }
+
+    /// The station at a solution of the programme at a parameter, heading for larger ones, or for smaller.
+    pub fn start(
+        &self,
+        at: &Stationary<PointOf<F>>,
+        parameter: f64,
+        rising: bool,
+    ) -> Option<Station<PointOf<F>>> {
+        let mut at = at.clone();
+        let arrival = self.correct(&mut at, parameter, None)?;
+        let mut station = self.station(at, arrival, None)?;
+        if (station.tangent.parameter > 0.0) != rising {
+            station.tangent.turn_round();
+        }
+        Some(station)
+    }
+
+    /// Follows the curve from a station to the end of the range or of the budget. `proceed` is asked once a step whether to
+    /// go on.
+    pub fn trace(
+        &self,
+        start: Station<PointOf<F>>,
+        proceed: &mut dyn FnMut(f64) -> ControlFlow<()>,
+    ) -> Curve<PointOf<F>> {
+        let mut curve = Curve {
+            stations: vec![start],
+            events: Vec::new(),
+            end: End::Budget,
+        };
+        let mut length = 0.2 * self.pace.longest;
+        while curve.stations.len() < self.pace.stations {
+            let last = curve.stations.last().expect("it began with one");
+            if proceed(last.parameter).is_break() {
+                curve.end = End::Interrupted;
+                break;
+            }
+            let Some(step) = self.advance(last, &mut length) else {
+                curve.end = End::Lost;
+                break;
+            };
+            if let Some(event) = step.event {
+                curve.stations.push(event.station.clone());
+                curve.events.push((curve.stations.len() - 1, event));
+            }
+            curve.stations.push(step.station);
+            if step.arrived {
+                curve.end = End::Range;
+                break;
+            }
+            if self.is_closed(&curve.stations) {
+                curve.end = End::Closed;
+                break;
+            }
+        }
+        curve
+    }
+
+    /// The station of the curve that is followed, at a place a little before an event or beyond it.
+    pub fn beside(&self, event: &Event<PointOf<F>>, by: f64) -> Option<Station<PointOf<F>>> {
+        let mut at = event.station.at.clone();
+        let arrival = self.correct(&mut at, event.parameter + by, None)?;
+        self.station(at, arrival, None)
+    }
+
+    /// The stations on other curves that are reached from one, at its parameter, by a push along a mode and against it.
+    pub fn others(
+        &self,
+        from: &Station<PointOf<F>>,
+        mode: &Mode,
+        proceed: &mut dyn FnMut(f64) -> ControlFlow<()>,
+    ) -> Option<[Option<Station<PointOf<F>>>; 2]>
+    where
+        F::Program: Clone,
+    {
+        let program = self.family.at(from.parameter)?;
+        let mut found = |forth| {
+            let at = pushed_over(&program, self.tolerance, &from.at, mode, forth, proceed)?;
+            let mut at = at;
+            let arrival = self.correct(&mut at, from.parameter, None)?;
+            self.station(at, arrival, None)
+        };
+        Some([found(true), found(false)])
+    }
+
+    /// The minimum downhill from a station, at another value of the parameter; where it is a saddle, off along a mode.
+    pub fn descend(
+        &self,
+        from: &Station<PointOf<F>>,
+        mode: &Mode,
+        parameter: f64,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Option<Solution<PointOf<F>>> {
+        const NEAR: f64 = 1e-5;
+        const ITERATIONS: usize = 300;
+        const OFF: f64 = 1e-3;
+        let settings = Settings {
+            tolerance: self.tolerance,
+            iterations: ITERATIONS,
+            barrier: NEAR,
+        };
+        let program = self.family.at(parameter)?;
+        let mut found = minimise(&program, &settings, from.at.point.clone(), proceed);
+        if !found.is_minimum() {
+            let mut off = found.at.point.clone();
+            program.retract(&found.at.point, &mode.motion, OFF, &mut off);
+            found = minimise(&program, &settings, off, proceed);
+        }
+        found.is_minimum().then_some(found)
+    }
+
+    /// The next station, and what lies between; the length of the step is adapted.
+    fn advance(&self, last: &Station<PointOf<F>>, length: &mut f64) -> Option<Step<PointOf<F>>> {
+        const LONGER: f64 = 1.5;
+        /// Cosine of the sharpest turn within a step.
+        const SHARPEST: f64 = 0.9;
+        loop {
+            let step = self.step(last, &last.tangent, *length);
+            let shortest = *length < 2.0 * SHORTEST;
+            let taken = step.filter(|next| {
+                let straight = last.cosine(next) > SHARPEST;
+                let apart = !self.pace.events || last.turns_before(next).is_some();
+                shortest || (straight && apart)
+            });
+            let Some(next) = taken else {
+                *length *= 0.5;
+                if *length < SHORTEST {
+                    return None;
+                }
+                continue;
+            };
+            let event = match self.pace.events {
+                true => self.event_between(last, &next, *length),
+                false => None,
+            };
+            let [low, high] = self.range;
+            if next.parameter < low || next.parameter > high {
+                let inside = event.filter(|event| (low..=high).contains(&event.station.parameter));
+                let from = inside.as_ref().map_or(last, |event| &event.station);
+                let end = next.parameter.clamp(low, high);
+                let station = self.land(from, &next, end)?;
+                return Some(Step {
+                    station,
+                    event: inside,
+                    arrived: true,
+                });
+            }
+            *length = (LONGER * *length).min(self.pace.longest);
+            return Some(Step {
+                station: next,
+                event,
+                arrived: false,
+            });
+        }
+    }
+
+    /// The station between two where the parameter has a value.
+    fn land(
+        &self,
+        from: &Station<PointOf<F>>,
+        to: &Station<PointOf<F>>,
+        parameter: f64,
+    ) -> Option<Station<PointOf<F>>> {
+        let share = (parameter - from.parameter) / (to.parameter - from.parameter);
+        let nearer = if share < 0.5 { from } else { to };
+        let mut at = nearer.at.clone();
+        let arrival = self.correct(&mut at, parameter, None)?;
+        self.station(at, arrival, Some(&to.tangent))
+    }
+
+    /// What happens between two stations, and where.
+    ///
+    /// The place is bracketed and closed in on by the secant. Very near to it the system is all but singular, and no step may
+    /// lead there any more; what is sought is smooth, so that the last secant tells the rest.
+    fn event_between(
+        &self,
+        from: &Station<PointOf<F>>,
+        to: &Station<PointOf<F>>,
+        length: f64,
+    ) -> Option<Event<PointOf<F>>> {
+        const ITERATIONS: usize = 30;
+        /// As close in the parameter as is worth while.
+        const CLOSE: f64 = 1e-9;
+        let turn = from.turns_before(to).unwrap_or(Some(Turn::Bifurcation))?;
+        let crossing = from.negative.min(to.negative) + 1;
+        // What changes its sign.
+        let place = |length: f64, station: Station<PointOf<F>>| {
+            let value = match turn {
+                Turn::Fold => station.tangent.parameter,
+                Turn::Bifurcation => {
+                    self.modes(&station, crossing)?
+                        .get(crossing - 1)?
+                        .eigenvalue
+                }
+            };
+            Some(Place {
+                length,
+                value,
+                station,
+            })
+        };
+        let mut low = place(0.0, from.clone())?;
+        let mut high = place(length, to.clone())?;
+        let (mut weights, mut stays) = ([1.0, 1.0], None);
+        for _ in 0..ITERATIONS {
+            let (a, b) = (weights[0] * low.value, weights[1] * high.value);
+            let next = low.length - a * (high.length - low.length) / (b - a);
+            let is_close = match turn {
+                Turn::Fold => low.value.abs().min(high.value.abs()) * (high.length - low.length),
+                Turn::Bifurcation => (high.station.parameter - low.station.parameter).abs(),
+            };
+            if is_close < CLOSE {
+                break;
+            }
+            let Some(next) = self
+                .step(from, &from.tangent, next)
+                .and_then(|station| place(next, station))
+            else {
+                break;
+            };
+            // The end that stays a second time counts for less, lest it stay for ever.
+            let is_low = (next.value < 0.0) == (low.value < 0.0);
+            weights = match (is_low, stays) {
+                (true, Some(true)) => [1.0, 0.5 * weights[1]],
+                (false, Some(false)) => [0.5 * weights[0], 1.0],
+                _ => [1.0, 1.0],
+            };
+            stays = Some(is_low);
+            match is_low {
+                true => low = next,
+                false => high = next,
+            }
+        }
+        if std::env::var("D").is_ok() {
+            eprintln!(
+                "{turn:?} {} {} | {} {}",
+                low.station.parameter, low.value, high.station.parameter, high.value
+            );
+        }
+        let share = low.value / (low.value - high.value);
+        let [a, b] = [&low, &high].map(|place| place.station.parameter);
+        let nearest = if share < 0.5 { low } else { high };
+        let parameter = match turn {
+            Turn::Fold => nearest.station.parameter,
+            Turn::Bifurcation => a + share * (b - a),
+        };
+        let mode = self.modes(&nearest.station, crossing)?;
+        let mode = mode.into_iter().nth(crossing - 1)?;
+        Some(Event {
+            turn,
+            parameter,
+            negative: [from.negative, to.negative],
+            mode,
+            station: nearest.station,
+        })
+    }
+
+    /// The lowest modes at a station.
+    fn modes(&self, station: &Station<PointOf<F>>, count: usize) -> Option<Vec<Mode>> {
+        let program = self.family.at(station.parameter)?;
+        let kkt = Kkt::factorise_any(&program, &mut station.at.clone()).ok()?;
+        lowest_modes_of(kkt, count).ok()
+    }
+
+    /// The station so far along a direction from another.
+    fn step(
+        &self,
+        from: &Station<PointOf<F>>,
+        along: &Tangent,
+        length: f64,
+    ) -> Option<Station<PointOf<F>>> {
+        let mut at = from.at.clone();
+        let arrival = self.correct(&mut at, from.parameter, Some((along, length)))?;
+        self.station(at, arrival, Some(along))
+    }
+
+    /// Newton's method at a fixed parameter or, with a direction given, so far along that and at most so far aside, lest it end
+    /// on another curve.
+    fn correct(
+        &self,
+        at: &mut Stationary<PointOf<F>>,
+        mut parameter: f64,
+        along: Option<(&Tangent, f64)>,
+    ) -> Option<Arrival> {
+        const MOST: usize = 20;
+        const ROUNDING: f64 = 1e-6;
+        let mut left = along.map_or(0.0, |(_, length)| length);
+        let mut aside = 0.0;
+        for _ in 0..MOST {
+            let program = self.family.at(parameter)?;
+            let mut kkt = Kkt::factorise_any(&program, at).ok()?;
+            let barrier = self.barrier(&program);
+            let missed = kkt.conditions(&at.bound_multipliers, barrier);
+            let residuals = kkt.residuals(&missed, &at.bound_multipliers);
+            if residuals.largest() <= self.tolerance && left == 0.0 {
+                return Some(Arrival {
+                    kkt,
+                    parameter,
+                    residuals,
+                });
+            }
+            let mut step = kkt.solve_nearly(&missed).ok()?;
+            let mut moved = 0.0;
+            let mut drift = None;
+            if let Some((along, length)) = along {
+                let by_parameter = self.by_parameter(at, parameter)?;
+                let answer = kkt.solve_nearly(&by_parameter).ok()?;
+                moved = (left - dot(&along.pull, &step.nodes))
+                    / (along.parameter + dot(&along.pull, &answer.nodes));
+                if !moved.is_finite() {
+                    return None;
+                }
+                step.add(moved, &answer);
+                drift = Some(by_parameter);
+                let way = dot(&kkt.pull(&step.nodes), &step.nodes) + moved * moved;
+                aside += (way - left * left).max(0.0).sqrt();
+                if aside > length.abs().max(ROUNDING) {
+                    return None;
+                }
+            }
+            let drift = |stage: usize, bound: usize| {
+                moved * drift.as_ref().map_or(0.0, |by| by.bounds[stage][bound])
+            };
+            let taken = move_along(&program, at, &step, drift)?;
+            parameter += taken * moved;
+            left *= 1.0 - taken;
+        }
+        None
+    }
+
+    /// The station where Newton's method has arrived.
+    fn station(
+        &self,
+        at: Stationary<PointOf<F>>,
+        mut arrival: Arrival,
+        before: Option<&Tangent>,
+    ) -> Option<Station<PointOf<F>>> {
+        let parameter = arrival.parameter;
+        let by_parameter = self.by_parameter(&at, parameter)?;
+        let negative = arrival.kkt.negative();
+        let motion = arrival.kkt.solve_nearly(&by_parameter).ok()?;
+        let mut tangent = Tangent {
+            pull: arrival.kkt.pull(&motion.nodes),
+            motion,
+            parameter: 1.0,
+        };
+        tangent.scale(tangent.dot(&tangent).sqrt().recip());
+        if before.is_some_and(|before| tangent.dot(before) < 0.0) {
+            tangent.turn_round();
+        }
+        Some(Station {
+            parameter,
+            at,
+            objective: arrival.kkt.values().objective,
+            residuals: arrival.residuals,
+            negative,
+            tangent,
+        })
+    }
+
+    /// Derivative of the first-order conditions by the parameter, by central differences; one-sided at the end of what the
+    /// family knows.
+    fn by_parameter(&self, at: &Stationary<PointOf<F>>, parameter: f64) -> Option<KktVector> {
+        let h = 1e-5;
+        let conditions = |parameter: f64| {
+            let program = self.family.at(parameter)?;
+            Kkt::conditions_of(&program, at)
+        };
+        let (mut high, low, width) = match (conditions(parameter + h), conditions(parameter - h)) {
+            (Some(high), Some(low)) => (high, low, 2.0 * h),
+            (Some(high), None) => (high, conditions(parameter)?, h),
+            (None, Some(low)) => (conditions(parameter)?, low, h),
+            (None, None) => return None,
+        };
+        high.add(-1.0, &low);
+        high.scale(width.recip());
+        Some(high)
+    }
+
+    /// Half of what complementarity may be.
+    fn barrier(&self, program: &F::Program) -> f64 {
+        let heaviest = program.weights().into_iter().fold(0.0, f64::max);
+        0.5 * self.tolerance / heaviest
+    }
+
+    /// Whether the last of the stations is where the first was, some way on.
+    fn is_closed(&self, stations: &[Station<PointOf<F>>]) -> bool {
+        const SOME_WAY: usize = 10;
+        const SAME: f64 = 1e-6;
+        let [first, .., last] = stations else {
+            return false;
+        };
+        let objective = (first.objective - last.objective).abs();
+        let parameter = (first.parameter - last.parameter).abs();
+        stations.len() > SOME_WAY && parameter <= SAME && objective <= SAME * first.objective.abs()
+    }
+}
+
+/// A step of a continuation.
+struct Step<X> {
+    station: Station<X>,
+    event: Option<Event<X>>,
+    arrived: bool,
+}
+
+/// A station so far along a step, and the value there of what is zero at an event.
+struct Place<X> {
+    length: f64,
+    value: f64,
+    station: Station<X>,
+}
+
+/// Where Newton's method has converged, factorised there.
+struct Arrival {
+    kkt: Kkt,
+    parameter: f64,
+    residuals: Residuals,
+}
+
+impl<X> Station<X> {
+    /// Cosine of the angle between the curve here and there.
+    fn cosine(&self, other: &Self) -> f64 {
+        self.tangent.dot(&other.tangent)
+    }
+
+    /// What happens on the way to the next station; `None` where it is more than one thing.
+    #[expect(
+        clippy::option_option,
+        reason = "nothing happens, or it cannot be told what"
+    )]
+    fn turns_before(&self, next: &Self) -> Option<Option<Turn>> {
+        let folds = (self.tangent.parameter < 0.0) != (next.tangent.parameter < 0.0);
+        match (folds, self.negative.abs_diff(next.negative)) {
+            (false, 0) => Some(None),
+            (true, 1) => Some(Some(Turn::Fold)),
+            (false, 1) => Some(Some(Turn::Bifurcation)),
+            _ => None,
+        }
+    }
+}
+
+impl Tangent {
+    fn scale(&mut self, by: f64) {
+        self.motion.scale(by);
+        self.pull.iter_mut().for_each(|node| *node *= by);
+        self.parameter *= by;
+    }
+
+    fn dot(&self, other: &Self) -> f64 {
+        dot(&self.pull, &other.motion.nodes) + self.parameter * other.parameter
+    }
+
+    fn turn_round(&mut self) {
+        self.scale(-1.0);
+    }
+}
+
+/// Moves a point and its multipliers along a step, as far as slacks and multipliers stay positive, and says which share of it
+/// that was. `drift` is what the programme's own change adds to a slack along the whole step.
+fn move_along<P: Program>(
+    program: &P,
+    at: &mut Stationary<P::Point>,
+    step: &KktVector,
+    drift: impl Fn(usize, usize) -> f64,
+) -> Option<f64> {
+    const KEEP: f64 = 0.995;
+    let mut values = Values::default();
+    if !program.evaluate(&mut at.point, &mut values) {
+        return None;
+    }
+    let mut linear = super::Linearisation::new(program);
+    program.linearise(
+        &at.point,
+        &at.multipliers,
+        &at.bound_multipliers,
+        &mut linear,
+    );
+    let (mut primal, mut dual) = (1.0, 1.0);
+    for (k, slacks) in values.slacks.iter().enumerate() {
+        for (b, slack) in slacks.iter().enumerate().take(program.bounds()) {
+            let by = &linear.slacks[k][b];
+            let [first, second] = [k, k + 1].map(|node| &step.nodes[node]);
+            let rate = by[0] * first[6] + by[1] * first[7] + by[2] * second[6] + by[3] * second[7];
+            let rate = rate + drift(k, b);
+            if rate * primal < -KEEP * slack {
+                primal = -KEEP * slack / rate;
+            }
+            let (multiplier, falls) = (at.bound_multipliers[k][b], step.bounds[k][b]);
+            if falls * dual > KEEP * multiplier {
+                dual = KEEP * multiplier / falls;
+            }
+        }
+    }
+    let mut moved = at.point.clone();
+    program.retract(&at.point, &step.nodes, primal, &mut moved);
+    at.point = moved;
+    for (rows, step) in at.multipliers.iter_mut().zip(&step.constraints) {
+        *rows += primal * step;
+    }
+    for (multipliers, steps) in at.bound_multipliers.iter_mut().zip(&step.bounds) {
+        for b in 0..BOUNDS {
+            multipliers[b] -= dual * steps[b];
+        }
+    }
+    Some(primal)
+}
+
+fn dot(a: &[NodeVector], b: &[NodeVector]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
+}
