@@ -18,6 +18,9 @@ pub struct Mesh {
     pub triangles: Vec<[u32; 3]>,
     /// The same triangles in the flat board, as indices of `flat`; they differ along the seam of a closed belt alone.
     pub flat_triangles: Vec<[u32; 3]>,
+    /// Arc lengths of the feet of the two ribs between which each triangle lies; those of one rib in the flat corner
+    /// beyond it.
+    pub spans: Vec<[f64; 2]>,
 }
 
 /// The mesh of the whole belt: strips between ribs of `n_across` points (at least 2), flat patches in the corners
@@ -38,7 +41,7 @@ pub fn mesh(spine: &Spine, n_across: usize) -> Mesh {
     for pair in rows.windows(2) {
         match pair[1].closes_plate {
             true => builder.plate(&pair[0], &pair[1]),
-            false => builder.strip(&pair[0].points, &pair[1].points),
+            false => builder.strip(&pair[0], &pair[1]),
         }
     }
     if let [first, .., last] = rows.as_slice() {
@@ -62,6 +65,11 @@ struct Row {
 }
 
 impl Row {
+    /// Arc length of its foot.
+    fn u(&self) -> f64 {
+        self.foot.point.u
+    }
+
     /// Vertex indices with their places on the rib, exactly in line.
     fn boundary(&self) -> Vec<(u32, Vector2<f64>)> {
         let [minus, plus] = &self.ends;
@@ -159,10 +167,11 @@ impl<'a> Builder<'a> {
         (self.mesh.vertices.len() - 1) as u32
     }
 
-    fn strip(&mut self, before: &[u32], after: &[u32]) {
-        for (a, b) in before.windows(2).zip(after.windows(2)) {
-            self.triangle([a[0], b[0], b[1]]);
-            self.triangle([a[0], b[1], a[1]]);
+    fn strip(&mut self, before: &Row, after: &Row) {
+        let span = [before, after].map(Row::u);
+        for (a, b) in before.points.windows(2).zip(after.points.windows(2)) {
+            self.triangle([a[0], b[0], b[1]], span);
+            self.triangle([a[0], b[1], a[1]], span);
         }
     }
 
@@ -186,7 +195,7 @@ impl<'a> Builder<'a> {
         let corner = self.board.chains.edges[side][corner as usize].curve.first();
         let around = [corner].into_iter().chain(edge);
         polygon.extend(around.map(|flat| (self.flat_vertex(&row.foot, flat), flat)));
-        self.patch(polygon);
+        self.patch(polygon, [row.u(); 2]);
     }
 
     /// The bent stiffener between two ribs.
@@ -206,7 +215,7 @@ impl<'a> Builder<'a> {
         if polygon.len() > 1 && polygon[0].0 == polygon[polygon.len() - 1].0 {
             polygon.pop();
         }
-        self.patch(polygon);
+        self.patch(polygon, [before, after].map(Row::u));
     }
 
     /// Mean length of the elements: how finely arcs are divided where there are no ribs.
@@ -222,7 +231,7 @@ impl<'a> Builder<'a> {
     }
 
     /// Triangles of a polygon in one plane, of vertices and where they ought to be but for the tolerance.
-    fn patch(&mut self, boundary: Vec<(u32, Vector2<f64>)>) {
+    fn patch(&mut self, boundary: Vec<(u32, Vector2<f64>)>, span: [f64; 2]) {
         let (mut vertices, corners): (Vec<u32>, Vec<_>) = boundary.into_iter().unzip();
         let mut polygon = Polygon(corners);
         if polygon.doubled_area() < 0.0 {
@@ -230,15 +239,16 @@ impl<'a> Builder<'a> {
             polygon.0.reverse();
         }
         for triangle in polygon.triangles() {
-            self.triangle(triangle.map(|i| vertices[i]));
+            self.triangle(triangle.map(|i| vertices[i]), span);
         }
     }
 
     /// Adds a triangle unless shared vertices have made it a line.
-    fn triangle(&mut self, [a, b, c]: [u32; 3]) {
+    fn triangle(&mut self, [a, b, c]: [u32; 3], span: [f64; 2]) {
         if a != b && b != c && c != a {
             self.mesh.triangles.push([a, b, c]);
             self.mesh.flat_triangles.push([a, b, c]);
+            self.mesh.spans.push(span);
         }
     }
 
@@ -275,6 +285,7 @@ impl Mesh {
             flat_triangles: triangles
                 .map(|t| t.map(|old| index[old as usize]))
                 .collect(),
+            spans: self.spans,
         }
     }
 }

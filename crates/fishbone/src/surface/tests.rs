@@ -14,7 +14,7 @@ use std::f64::consts::{PI, TAU};
 const WIDTH: f64 = 0.1;
 
 /// Whether ribs keep clear of one another on the board.
-fn is_admissible(spine: &Spine) -> bool {
+pub(super) fn is_admissible(spine: &Spine) -> bool {
     let board = Board::of(spine);
     let strip = |element: &usize| matches!(spine.pieces[*element], Piece::Strip { .. });
     (0..spine.elements()).filter(strip).all(|element| {
@@ -237,6 +237,20 @@ proptest! {
         for (x, flat) in mesh.vertices.iter().zip(&mesh.flat) {
             let expected = material_point(&spine, flat.x, flat.y);
             prop_assert!(expected.is_some_and(|expected| (x - expected).norm() < 1e-6), "{flat}");
+        }
+    }
+
+    #[test]
+    fn test_triangles_lie_between_the_ribs_of_their_span(plan in plans()) {
+        let spine = plan.spine();
+        prop_assume!(turning(&plan) < 3.0 && is_admissible(&spine));
+        let mesh = mesh(&spine, 3);
+        prop_assert_eq!(mesh.spans.len(), mesh.triangles.len());
+        for (triangle, [from, to]) in mesh.flat_triangles.iter().zip(&mesh.spans) {
+            let [a, b, c] = triangle.map(|i| mesh.flat[i as usize]);
+            let middle = (a + b + c) / 3.0;
+            let foot = rib_foot(&spine, middle.x, middle.y);
+            prop_assert!(foot.is_some_and(|u| from - 1e-6 <= u && u <= to + 1e-6), "{foot:?} {from} {to}");
         }
     }
 
