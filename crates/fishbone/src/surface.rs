@@ -15,6 +15,7 @@ mod outline;
 mod patch;
 mod reach;
 mod rib;
+mod self_crossing;
 
 pub use curvature::*;
 pub use curve::*;
@@ -24,6 +25,7 @@ pub use mesh::*;
 pub use outline::*;
 pub use reach::*;
 pub use rib::*;
+pub use self_crossing::*;
 
 #[cfg(test)]
 pub(crate) mod samples;

@@ -1,0 +1,340 @@
+//! Whether the bent belt passes through itself.
+//!
+//! The belt is taken as the triangles of its [`mesh`] between neighbouring ribs. Two of them cross where an edge of one
+//! pierces the other. Three things keep what only touches, and what only lies side by side, from being told as a
+//! crossing:
+//!
+//! - **Turn.** The line that is straight in the flat board turns, where the belt is bent, by no more than the normal ξ
+//!   turns from rib to rib, and along the board's inner edges by no more than the board itself. A closed curve with one
+//!   corner turns by π elsewhere. So places between which the belt turns by less than half a turn cannot meet, and
+//!   neighbours, ribs that meet on an edge, corners of the board and the seam of a closed belt need no care.
+//! - **Angle.** Sheets pass through each other where their normals differ by more than they turn within the two
+//!   triangles. Where they do not, elements are divided; sheets that cannot be told apart then lie on each other, as
+//!   the layers of a wound belt do.
+//! - **Margin.** The belt is made narrower and shorter by a ten-thousandth of its width on all sides, so that an edge
+//!   or an end that rests against the belt, as exactly as a solver puts it there, stays clear.
+
+use super::mesh::mesh;
+use crate::spine::{Piece, Spine, SpinePoint};
+use nalgebra::Vector3;
+use std::ops::Range;
+
+/// What is cut off on all sides, in widths: far above a solver's residuals, far below what is made.
+const MARGIN: f64 = 1e-4;
+
+/// Turn between places that may meet: half a turn, less what the nodes leave uncertain.
+///
+/// Units: rad
+const LEAST_TURN: f64 = 3.0;
+
+/// Angle below which sheets without bend count as lying on each other.
+///
+/// Units: rad
+const LEAST_ANGLE: f64 = 1e-3;
+
+/// Parts into which elements are divided, one number after the other, until it is clear whether sheets cross.
+const PARTS: [usize; 3] = [1, 4, 16];
+
+/// Elements beyond which none are divided: so many turn by little as they are.
+const MOST_ELEMENTS: usize = 1 << 13;
+
+/// Where the bent belt passes through itself, as two arc lengths, those of the first place that another passes through
+/// and of that other; `None` where it does not.
+///
+/// The arc lengths are the middles of the two elements, or parts of elements, that meet. The triangles lie off the
+/// bent belt by the sagitta of an element, |κ₁| h²/8, and nothing finer is told: what passes through itself less deep
+/// may be missed, an edge that passes another sheet closer than that may be taken to cross it. Sheets that lie on each
+/// other, that touch or that cross at less than 1e-3 rad do not count as crossing, nor does what happens within 1e-4
+/// widths of the edges and the ends. Where ribs cross inside the board, against Eq. (33), there is no surface, and no
+/// certain answer.
+pub fn crosses_itself(spine: &Spine) -> Option<[f64; 2]> {
+    for parts in PARTS {
+        if parts > 1 && parts * spine.elements() > MOST_ELEMENTS {
+            break;
+        }
+        match first_crossing(&trimmed(spine, parts)) {
+            Crossing::None => break,
+            Crossing::Doubtful => {}
+            Crossing::At(places) => return Some(places),
+        }
+    }
+    None
+}
+
+/// What is known of a belt that is divided so far.
+enum Crossing {
+    None,
+    /// Triangles cross, but at less than the angles by which the belt turns within them.
+    Doubtful,
+    At([f64; 2]),
+}
+
+/// The first facet, in the order of u, that another one passes through.
+fn first_crossing(spine: &Spine) -> Crossing {
+    if spine.elements() == 0 {
+        return Crossing::None;
+    }
+    let (facets, whole_turn) = facets(spine);
+    let tree = Tree::new(facets.iter().map(Facet::bounds).collect());
+    let mut is_doubtful = false;
+    for facet in &facets {
+        let mut is_crossed = |index: usize| {
+            let is_across = facet.is_across(&facets[index]);
+            // One doubt is enough.
+            let counts = is_across || !is_doubtful;
+            let is_crossed = counts && facet.meets(&facets[index]);
+            is_doubtful |= is_crossed && !is_across;
+            is_crossed && is_across
+        };
+        let first = facets.partition_point(|other| other.turn[1] < facet.turn[0] + LEAST_TURN);
+        let last = match spine.half_turns {
+            Some(_) => {
+                let latest = facet.turn[1] + whole_turn - LEAST_TURN;
+                facets.partition_point(|other| other.turn[0] <= latest)
+            }
+            None => facets.len(),
+        };
+        if let Some(other) = tree.find(&facet.bounds(), first..last, &mut is_crossed) {
+            return Crossing::At([facet.middle(), facets[other].middle()]);
+        }
+    }
+    match is_doubtful {
+        true => Crossing::Doubtful,
+        false => Crossing::None,
+    }
+}
+
+/// The spine of the belt without the margin, its elements divided into equal parts.
+fn trimmed(spine: &Spine, parts: usize) -> Spine {
+    let margin = MARGIN * spine.width.min(spine.length());
+    let ends = [0, spine.elements()].map(|node| spine.u.get(node).copied().unwrap_or(0.0));
+    let [from, to] = match spine.half_turns {
+        Some(_) => ends,
+        None => [ends[0] + margin, ends[1] - margin],
+    };
+    let (mut nodes, mut pieces): (Vec<SpinePoint>, Vec<Piece>) = (Vec::new(), Vec::new());
+    for element in 0..spine.elements() {
+        let (first, length) = (spine.u[element], spine.element_length(element));
+        let [start, end] = [from, to].map(|u| (u - first).max(0.0).min(length));
+        let is_joint = length == 0.0 && from <= first && first <= to;
+        if start >= end && !is_joint {
+            continue;
+        }
+        if nodes.is_empty() {
+            nodes.push(point(spine, element, start));
+        }
+        let parts = if is_joint { 1 } else { parts };
+        for part in 1..parts {
+            let share = part as f64 / parts as f64;
+            nodes.push(spine.within(element, start + share * (end - start)));
+        }
+        nodes.push(match end == length {
+            true => spine.node(element + 1),
+            false => spine.within(element, end),
+        });
+        pieces.extend(vec![spine.pieces[element]; parts]);
+    }
+    Spine {
+        width: spine.width - 2.0 * margin,
+        pieces,
+        half_turns: spine.half_turns,
+        u: nodes.iter().map(|node| node.u).collect(),
+        pose: nodes.iter().map(|node| node.pose).collect(),
+        bend: nodes.iter().map(|node| node.bend).collect(),
+        rib_slope: nodes.iter().map(|node| node.rib_slope).collect(),
+    }
+}
+
+/// The spine inside an element, its first node included.
+fn point(spine: &Spine, element: usize, distance: f64) -> SpinePoint {
+    match distance > 0.0 {
+        true => spine.within(element, distance),
+        false => spine.node(element),
+    }
+}
+
+/// How far the belt has turned at every node: the normal from rib to rib, and the board in its plane.
+///
+/// Units: rad
+fn turns(spine: &Spine) -> Vec<f64> {
+    let normal_rate = |node: usize| spine.bend[node].abs() * 1f64.hypot(spine.rib_slope[node]);
+    let mut turned = 0.0;
+    let mut turns = vec![turned];
+    for element in 0..spine.elements() {
+        let piece = spine.pieces[element];
+        let rate = 0.5 * (normal_rate(element) + normal_rate(element + 1)) + piece.geodesic().abs();
+        turned += spine.element_length(element) * rate + piece.corner().abs();
+        turns.push(turned);
+    }
+    turns
+}
+
+/// The triangles of the belt in the order of u, and how far the whole belt turns.
+fn facets(spine: &Spine) -> (Vec<Facet>, f64) {
+    let (mesh, turns) = (mesh(spine, 2), turns(spine));
+    let last = turns.len() - 1;
+    let facet = |(triangle, &u): (&[u32; 3], &[f64; 2])| {
+        let normals = u.map(|u| spine.at(u).pose.frame.column(0).into_owned());
+        let before = spine.u.partition_point(|&node| node < u[0]);
+        let after = spine.u.partition_point(|&node| node <= u[1]);
+        Facet {
+            corners: triangle.map(|index| mesh.vertices[index as usize]),
+            u,
+            turn: [turns[before.saturating_sub(1)], turns[after.min(last)]],
+            normal: normals[0] + normals[1],
+            spread: 0.5 * normals[0].angle(&normals[1]),
+        }
+    };
+    let mut facets: Vec<_> = mesh.triangles.iter().zip(&mesh.spans).map(facet).collect();
+    facets.sort_by(|a, b| a.u[0].total_cmp(&b.u[0]));
+    (facets, turns[last])
+}
+
+/// A triangle of the belt.
+#[derive(Debug)]
+struct Facet {
+    corners: [Vector3<f64>; 3],
+    /// Arc lengths of the feet of the ribs that it lies between.
+    u: [f64; 2],
+    /// How far the belt has turned, before it and after it.
+    turn: [f64; 2],
+    /// The normal of the belt in its middle, of any length.
+    normal: Vector3<f64>,
+    /// Angle by which the normal of the belt differs from that, at most.
+    spread: f64,
+}
+
+impl Facet {
+    fn middle(&self) -> f64 {
+        0.5 * (self.u[0] + self.u[1])
+    }
+
+    fn bounds(&self) -> Bounds {
+        let [a, b, c] = &self.corners;
+        Bounds {
+            low: a.inf(b).inf(c),
+            high: a.sup(b).sup(c),
+        }
+    }
+
+    fn edges(&self) -> [[Vector3<f64>; 2]; 3] {
+        let [a, b, c] = self.corners;
+        [[a, b], [b, c], [c, a]]
+    }
+
+    /// Whether an edge of one pierces the other.
+    fn meets(&self, other: &Self) -> bool {
+        let pierces = |a: &Self, b: &Self| a.edges().iter().any(|edge| b.is_pierced_by(edge));
+        pierces(self, other) || pierces(other, self)
+    }
+
+    /// Whether the sheets differ in direction all over the two triangles.
+    fn is_across(&self, other: &Self) -> bool {
+        let (sine, cosine) = (
+            self.normal.cross(&other.normal).norm(),
+            self.normal.dot(&other.normal).abs(),
+        );
+        sine.atan2(cosine) > self.spread + other.spread + LEAST_ANGLE
+    }
+
+    /// Whether an edge goes from one side of the triangle through it to the other.
+    ///
+    /// A point of its plane counts to one side, always the same, so that a line of edges that passes through at a
+    /// vertex does so with one of them; the boundary is part of the triangle, and a little beyond against rounding.
+    fn is_pierced_by(&self, [p, q]: &[Vector3<f64>; 2]) -> bool {
+        const SLACK: f64 = 1e-6;
+        let [a, b, c] = &self.corners;
+        let normal = (b - a).cross(&(c - a));
+        let [above, below] = [p, q].map(|point| normal.dot(&(point - a)));
+        if (above > 0.0) == (below > 0.0) {
+            return false;
+        }
+        let point = p + above / (above - below) * (q - p);
+        let is_inside = |[a, b]: [Vector3<f64>; 2]| {
+            normal.dot(&(b - a).cross(&(point - a))) >= -SLACK * normal.norm_squared()
+        };
+        self.edges().into_iter().all(is_inside)
+    }
+}
+
+/// A box along the axes.
+#[derive(Clone, Copy)]
+struct Bounds {
+    low: Vector3<f64>,
+    high: Vector3<f64>,
+}
+
+impl Bounds {
+    /// The box of nothing.
+    fn empty() -> Self {
+        Self {
+            low: Vector3::repeat(f64::INFINITY),
+            high: Vector3::repeat(f64::NEG_INFINITY),
+        }
+    }
+
+    fn around(&self, other: &Self) -> Self {
+        Self {
+            low: self.low.inf(&other.low),
+            high: self.high.sup(&other.high),
+        }
+    }
+
+    fn overlaps(&self, other: &Self) -> bool {
+        (0..3).all(|k| self.low[k] <= other.high[k] && other.low[k] <= self.high[k])
+    }
+}
+
+/// Boxes around neighbours, around pairs of those, and so on: neighbours along the belt are neighbours in space.
+struct Tree {
+    /// The box of everything at 1, the halves of number k at 2k and 2k + 1.
+    bounds: Vec<Bounds>,
+}
+
+impl Tree {
+    fn new(leaves: Vec<Bounds>) -> Self {
+        let size = leaves.len().next_power_of_two();
+        let mut bounds = vec![Bounds::empty(); 2 * size];
+        bounds[size..size + leaves.len()].copy_from_slice(&leaves);
+        for index in (1..size).rev() {
+            bounds[index] = bounds[2 * index].around(&bounds[2 * index + 1]);
+        }
+        Self { bounds }
+    }
+
+    /// The first wanted leaf of a range whose box overlaps another.
+    fn find(
+        &self,
+        bounds: &Bounds,
+        range: Range<usize>,
+        is_wanted: &mut impl FnMut(usize) -> bool,
+    ) -> Option<usize> {
+        self.find_below(1, 0..self.bounds.len() / 2, bounds, &range, is_wanted)
+    }
+
+    /// The same among the leaves below one box.
+    fn find_below(
+        &self,
+        index: usize,
+        leaves: Range<usize>,
+        bounds: &Bounds,
+        range: &Range<usize>,
+        is_wanted: &mut impl FnMut(usize) -> bool,
+    ) -> Option<usize> {
+        let is_outside = leaves.end <= range.start || range.end <= leaves.start;
+        if is_outside || !self.bounds[index].overlaps(bounds) {
+            return None;
+        }
+        if leaves.len() == 1 {
+            return is_wanted(leaves.start).then_some(leaves.start);
+        }
+        let middle = leaves.start + leaves.len() / 2;
+        self.find_below(2 * index, leaves.start..middle, bounds, range, is_wanted)
+            .or_else(|| {
+                self.find_below(2 * index + 1, middle..leaves.end, bounds, range, is_wanted)
+            })
+    }
+}
+
+#[cfg(test)]
+mod tests;
