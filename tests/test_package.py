@@ -121,6 +121,7 @@ def test_the_result_as_a_dict_says_what_the_attributes_say(equilibrium):
     assert result["residuals"] == equilibrium.residuals._asdict()
     assert result["least_bend_radius"] == equilibrium.least_bend_radius._asdict()
     assert result["rib_margin"] == equilibrium.rib_margin._asdict()
+    assert result["crosses_itself"] is equilibrium.crosses_itself is None
     assert result["scenario"] == equilibrium.scenario.to_dict()
 
 

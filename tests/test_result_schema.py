@@ -43,6 +43,7 @@ KEYS = {
     "supports",
     "least_bend_radius",
     "rib_margin",
+    "crosses_itself",
     "stable",
     "negative_modes",
     "zero_modes",

@@ -54,6 +54,7 @@ def test_scenario_comes_to_what_finer_meshes_say(name: str) -> None:
     place = equilibrium.highest_point.position / equilibrium.u[-1]
     np.testing.assert_allclose(place, highest, atol=PLACE_ERROR)
     assert equilibrium.warnings == []
+    assert equilibrium.crosses_itself is None
 
 
 @names

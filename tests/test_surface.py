@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 
 import numpy as np
@@ -149,6 +150,44 @@ def test_rib_margin_is_the_least_distance_to_the_bound(energy: Energy, build: Bu
     assert margin["value"] >= -1e-7
     assert margin["value"] == pytest.approx(float(np.min(2.0 / WIDTH - slope_rate)), abs=1e-8)
     assert 0.0 <= margin["u"] <= 1.0
+
+
+# --------------------------------------------------------------------------------------------- passes through itself
+
+
+def teardrop(above: float, energy: Energy) -> Json:
+    """Both ends on one line, and turned so far towards each other that the legs between them meet in their plane."""
+    return clamped((-0.1, 0.0, above), (0.0, 0.0, 2.4), energy=energy)
+
+
+def meeting_places(equilibrium: fb.Equilibrium) -> list[tuple[float, float]]:
+    """Arc lengths at which the chords of the spine meet, seen along z."""
+    ends = equilibrium.position[:, :2]
+    along, u = np.diff(ends, axis=0), equilibrium.u
+    found = []
+    for i, j in itertools.combinations(range(len(along)), 2):
+        if j > i + 1:
+            shares = np.linalg.solve(np.transpose([along[i], -along[j]]), ends[j] - ends[i])
+            if np.all((shares >= 0.0) & (shares < 1.0)):
+                found.append((float(u[i] + shares[0] * (u[i + 1] - u[i])), float(u[j] + shares[1] * (u[j + 1] - u[j]))))
+    return found
+
+
+@energy_model
+def test_plane_belt_crosses_itself_where_its_spine_meets_itself(energy: Energy) -> None:
+    equilibrium = solve(teardrop(0.0, energy))
+    assert np.ptp(equilibrium.position[:, 2]) < 1e-6
+    [expected] = meeting_places(equilibrium)
+    assert equilibrium.crosses_itself == pytest.approx(expected, abs=1.0 / 80.0)
+    assert result(equilibrium)["crosses_itself"] == list(equilibrium.crosses_itself or ())
+
+
+@energy_model
+def test_belt_whose_legs_pass_above_each_other_by_more_than_the_width_does_not_cross(energy: Energy) -> None:
+    """Seen along z they still meet."""
+    equilibrium = solve(teardrop(0.3, energy))
+    assert meeting_places(equilibrium)
+    assert equilibrium.crosses_itself is None
 
 
 # -------------------------------------------------------------------------------------- developable, isometric

@@ -341,6 +341,15 @@ class Equilibrium:
         return RibMargin(*self._inner.rib_margin)
 
     @property
+    def crosses_itself(self) -> tuple[float, float] | None:
+        """Arc lengths of the first two places that pass through each other; None where the belt stays clear of itself.
+
+        The model knows no contact, so an equilibrium may do what a belt cannot. What only touches or lies on itself
+        does not cross; what lies closer than the sagitta of an element, |κ₁| h²/8, is not told apart.
+        """
+        return self._inner.crosses_itself
+
+    @property
     def links(self) -> Floats:
         """Force of each link on the belt at its `to`, in the order of the scenario; at its `from` it is the opposite.
 

@@ -298,6 +298,12 @@ impl Equilibrium {
         (margin.value, margin.u)
     }
 
+    /// (u, u) of the first two places that pass through each other, or None where none do.
+    #[getter]
+    fn crosses_itself(&self) -> Option<(f64, f64)> {
+        surface::crosses_itself(&self.solved.spine).map(<(f64, f64)>::from)
+    }
+
     /// Points of the surface.
     ///
     /// Shapes: (n, `n_across`, 3).
