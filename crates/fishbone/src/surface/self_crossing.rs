@@ -36,7 +36,13 @@ const LEAST_ANGLE: f64 = 1e-3;
 const PARTS: [usize; 3] = [1, 4, 16];
 
 /// Elements beyond which none are divided: so many turn by little as they are.
-const MOST_ELEMENTS: usize = 1 << 13;
+const MOST_ELEMENTS: usize = 1 << 12;
+
+/// Length, in widths, and turn up to which neighbouring elements are taken as one: slivers lie in boxes much larger than
+/// themselves.
+///
+/// Units: 1, rad
+const FINEST: [f64; 2] = [1.0 / 32.0, 0.01];
 
 /// Where the bent belt passes through itself, as two arc lengths, those of the first place that another passes through
 /// and of that other; `None` where it does not.
@@ -44,15 +50,16 @@ const MOST_ELEMENTS: usize = 1 << 13;
 /// The arc lengths are the middles of the two elements, or parts of elements, that meet. The triangles lie off the
 /// bent belt by the sagitta of an element, |κ₁| h²/8, and nothing finer is told: what passes through itself less deep
 /// may be missed, an edge that passes another sheet closer than that may be taken to cross it. Sheets that lie on each
-/// other, that touch or that cross at less than 1e-3 rad do not count as crossing, nor does what happens within 1e-4
-/// widths of the edges and the ends. Where ribs cross inside the board, against Eq. (33), there is no surface, and no
-/// certain answer.
+/// other or touch do not count as crossing, nor do sheets that cross at less than a hundredth of a radian or than the
+/// turn of an element, of a sixteenth of one up to 256 elements, of a quarter up to 1024. What happens within 1e-4
+/// widths of the edges and the ends does not count either. Where ribs cross inside the board, against Eq. (33), there
+/// is no surface, and no certain answer.
 pub fn crosses_itself(spine: &Spine) -> Option<[f64; 2]> {
     for parts in PARTS {
         if parts > 1 && parts * spine.elements() > MOST_ELEMENTS {
             break;
         }
-        match first_crossing(&trimmed(spine, parts)) {
+        match first_crossing(&thinned(&trimmed(spine, parts), parts)) {
             Crossing::None => break,
             Crossing::Doubtful => {}
             Crossing::At(places) => return Some(places),
@@ -145,6 +152,38 @@ fn trimmed(spine: &Spine, parts: usize) -> Spine {
     }
 }
 
+/// The spine with neighbouring elements taken as one as far as they are short and turn little.
+fn thinned(spine: &Spine, parts: usize) -> Spine {
+    let turns = turns(spine);
+    let [length, turn] = FINEST.map(|finest| finest / parts as f64);
+    let mut kept: Vec<usize> = Vec::new();
+    for node in 0..spine.u.len() {
+        let is_needless = |&last: &usize| {
+            let next = node + 1;
+            next < spine.u.len()
+                && spine.pieces[node - 1] == spine.pieces[node]
+                && spine.u[next] - spine.u[last] <= length * spine.width
+                && turns[next] - turns[last] <= turn
+        };
+        if !kept.last().is_some_and(is_needless) {
+            kept.push(node);
+        }
+    }
+    Spine {
+        width: spine.width,
+        pieces: kept
+            .iter()
+            .skip(1)
+            .map(|&node| spine.pieces[node - 1])
+            .collect(),
+        half_turns: spine.half_turns,
+        u: kept.iter().map(|&node| spine.u[node]).collect(),
+        pose: kept.iter().map(|&node| spine.pose[node]).collect(),
+        bend: kept.iter().map(|&node| spine.bend[node]).collect(),
+        rib_slope: kept.iter().map(|&node| spine.rib_slope[node]).collect(),
+    }
+}
+
 /// The spine inside an element, its first node included.
 fn point(spine: &Spine, element: usize, distance: f64) -> SpinePoint {
     match distance > 0.0 {
@@ -170,15 +209,18 @@ fn turns(spine: &Spine) -> Vec<f64> {
 }
 
 /// The triangles of the belt in the order of u, and how far the whole belt turns.
+///
+/// In the axes of the start, to which the ribs of many belts are parallel: boxes along them are tight.
 fn facets(spine: &Spine) -> (Vec<Facet>, f64) {
     let (mesh, turns) = (mesh(spine, 2), turns(spine));
     let last = turns.len() - 1;
+    let start = spine.pose[0].inverse();
     let facet = |(triangle, &u): (&[u32; 3], &[f64; 2])| {
-        let normals = u.map(|u| spine.at(u).pose.frame.column(0).into_owned());
+        let normals = u.map(|u| (start * spine.at(u).pose).frame.column(0).into_owned());
         let before = spine.u.partition_point(|&node| node < u[0]);
         let after = spine.u.partition_point(|&node| node <= u[1]);
         Facet {
-            corners: triangle.map(|index| mesh.vertices[index as usize]),
+            corners: triangle.map(|index| start.transform(&mesh.vertices[index as usize])),
             u,
             turn: [turns[before.saturating_sub(1)], turns[after.min(last)]],
             normal: normals[0] + normals[1],
