@@ -4,7 +4,18 @@ from typing import Final, Literal, final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Equilibrium", "Scenario", "Sensitivity", "Tracker", "__version__", "solve", "solve_many"]
+__all__ = [
+    "Diagram",
+    "Equilibrium",
+    "Path",
+    "Scenario",
+    "Sensitivity",
+    "Tracker",
+    "__version__",
+    "follow",
+    "solve",
+    "solve_many",
+]
 
 __version__: Final[str]
 
@@ -102,6 +113,30 @@ class Equilibrium:
     def to_json(self) -> str: ...
 
 @final
+class Path:
+    @staticmethod
+    def numbers(scenario: Scenario, changes: list[tuple[str, float]]) -> Path: ...
+    @staticmethod
+    def poses(scenario: Scenario, support: int, poses: list[tuple[_Row, _Row]], screw: bool) -> Path: ...
+
+@final
+class Diagram:
+    @property
+    def branches(self) -> int: ...
+    def states(self, branch: int) -> int: ...
+    def origin(self, branch: int) -> tuple[int, int] | None: ...
+    def end(self, branch: int) -> str: ...
+    def negative_modes(self, branch: int) -> list[int]: ...
+    def events(
+        self, branch: int
+    ) -> list[tuple[str, float, int, tuple[int, int], tuple[float, Scenario, Equilibrium] | None]]: ...
+    def report(
+        self, branch: int
+    ) -> tuple[_Floats, _Floats, _Floats, _Floats, _Floats, _Floats, _Floats, _Floats]: ...
+    def positions(self, branch: int) -> list[_Floats]: ...
+    def equilibrium(self, branch: int, state: int) -> tuple[Scenario, Equilibrium]: ...
+
+@final
 class Sensitivity:
     @property
     def shape(self) -> tuple[int, int, int]: ...
@@ -136,6 +171,14 @@ class Tracker:
     def reaction(self, support: int) -> tuple[_Row, _Row]: ...
 
 def solve(scenario: Scenario) -> Equilibrium: ...
+def follow(
+    equilibrium: Equilibrium,
+    path: Path,
+    step: float,
+    states: int,
+    branches: int,
+    progress: Callable[[int, float], object] | None = None,
+) -> Diagram: ...
 def solve_many(
     scenarios: list[Scenario], progress: Callable[[int, int], object] | None = None
 ) -> list[Equilibrium]: ...

@@ -79,7 +79,8 @@ pub(crate) fn grid<'py>(
     vectors: impl Iterator<Item = Vector3<f64>>,
 ) -> PyResult<Grid<'py>> {
     let flat: Vec<f64> = vectors.flat_map(|vector| row(&vector)).collect();
-    let shape = (flat.len() / (3 * n_across), n_across, 3);
+    let rows = flat.len().checked_div(3 * n_across).unwrap_or(0);
+    let shape = (rows, n_across, 3);
     let array = Array3::from_shape_vec(shape, flat)
         .map_err(|error| PyRuntimeError::new_err(error.to_string()))?;
     Ok(array.into_pyarray(py))

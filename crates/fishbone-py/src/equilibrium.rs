@@ -48,6 +48,11 @@ impl Equilibrium {
         Self::of(|| equilibrium::solve(scenario, proceed))
     }
 
+    /// What was found.
+    pub(crate) fn core(&self) -> &equilibrium::Equilibrium {
+        &self.solved
+    }
+
     /// What was solved.
     pub(crate) fn scenario(&self) -> &fishbone::scenario::Scenario {
         &self.solved.scenario
@@ -79,9 +84,21 @@ impl Signals {
     }
 
     pub(crate) fn proceed(&mut self) -> ControlFlow<()> {
+        self.proceed_with(|_| Ok(()))
+    }
+
+    /// The same, with something to be told to Python whenever it is asked.
+    pub(crate) fn proceed_with(
+        &mut self,
+        tell: impl FnOnce(Python<'_>) -> PyResult<()>,
+    ) -> ControlFlow<()> {
         if self.raised.is_none() && self.asked.elapsed() >= SIGNAL_INTERVAL {
             self.asked = Instant::now();
-            self.raised = Python::attach(|py| py.check_signals()).err();
+            let asked = Python::attach(|py| {
+                py.check_signals()?;
+                tell(py)
+            });
+            self.raised = asked.err();
         }
         match self.raised {
             Some(_) => ControlFlow::Break(()),

@@ -3,6 +3,7 @@
 mod array;
 mod batch;
 mod equilibrium;
+mod follow;
 mod scenario;
 mod sensitivity;
 mod tracker;
@@ -14,6 +15,8 @@ mod _core {
     use crate::batch::solve_many;
     #[pymodule_export]
     use crate::equilibrium::{Equilibrium, solve};
+    #[pymodule_export]
+    use crate::follow::{Diagram, Path, follow};
     #[pymodule_export]
     use crate::scenario::Scenario;
     #[pymodule_export]

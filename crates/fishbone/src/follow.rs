@@ -1,12 +1,14 @@
 //! The equilibria along a path, stable or not: where they fold, where others branch off, and what the belt snaps to.
 
-use crate::equilibrium::{Equilibrium, Status, of_solution, program_of};
+use crate::equilibrium::{Equilibrium, Status, Wrench, of_solution, program_of};
 use crate::path::Path;
 use crate::program::{BeltPoint, BeltProgram};
 use crate::scenario::Scenario;
 use crate::solver::{
     self, Continuation, Curve, Family, Pace, Residuals, Shape, Station, Stationary, Turn,
 };
+use crate::stability::Stability;
+use crate::surface;
 use crate::twins::are_twins;
 use nalgebra::Vector3;
 use std::ops::ControlFlow;
@@ -94,6 +96,29 @@ pub struct State {
     /// How far it is from a solution of its discrete equations.
     pub residuals: Residuals,
     at: Stationary<BeltPoint>,
+}
+
+/// What a report says of a state, in the units of its scenario.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Summary {
+    /// What the path calls the place.
+    pub parameter: f64,
+    /// Total potential.
+    pub energy: f64,
+    /// How far the highest point is along the bulge.
+    pub height: f64,
+    /// What the supports do to the belt, in the order of the scenario.
+    pub reactions: Vec<Wrench>,
+    /// Least radius of bend over the whole width, where it bends.
+    pub least_bend_radius: Option<f64>,
+    /// Least radius of bend on the spine, where it bends.
+    pub least_spine_radius: Option<f64>,
+    /// How far the ribs are from crossing.
+    pub rib_margin: f64,
+    /// The second variation, where it can be decided.
+    pub stability: Option<Stability>,
+    /// How far it is from a solution of its discrete equations.
+    pub residuals: Residuals,
 }
 
 /// What happens at an event.
@@ -396,6 +421,30 @@ impl Diagram {
         let at = &self.branches[branch].states[state].at;
         let solution = solver::assess(&program, scenario.solver.tolerance, at);
         of_solution(&scenario, program, solution)
+    }
+
+    /// What a report on the path says of a state.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such state.
+    pub fn summary(&self, branch: usize, state: usize) -> Summary {
+        let equilibrium = self.equilibrium(branch, state);
+        let spine = &equilibrium.spine;
+        let bulge = Vector3::from(equilibrium.scenario.solver.bulge);
+        Summary {
+            parameter: self
+                .path
+                .parameter(self.branches[branch].states[state].place),
+            energy: equilibrium.energy,
+            height: equilibrium.highest_point().position.dot(&bulge.normalize()),
+            reactions: equilibrium.reactions.iter().map(|on| on.wrench).collect(),
+            least_bend_radius: surface::least_bend_radius(spine).map(|least| least.value),
+            least_spine_radius: surface::least_spine_radius(spine).map(|least| least.value),
+            rib_margin: surface::rib_margin(spine).value,
+            stability: equilibrium.stability,
+            residuals: equilibrium.residuals,
+        }
     }
 
     /// Whether a branch other than one that is excepted passes through a station.

@@ -1,0 +1,226 @@
+//! `_core.Path`, `_core.follow` and `_core.Diagram`.
+
+use crate::array::{self, Grid, Points, Scalars};
+use crate::equilibrium::{Equilibrium, Signals};
+use crate::scenario::Scenario;
+use fishbone::follow::{self as core, End, Settings, Summary};
+use fishbone::path::{self, Motion};
+use nalgebra::Vector3;
+use numpy::IntoPyArray;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+/// A way through the space of scenarios.
+#[pyclass(frozen, module = "fishbone._core")]
+pub(crate) struct Path(path::Path);
+
+#[pymethods]
+impl Path {
+    /// Numbers of a scenario that change together, each a field and its last value.
+    ///
+    /// Errors: `ValueError`, one line.
+    #[staticmethod]
+    fn numbers(scenario: &Scenario, changes: Vec<(String, f64)>) -> PyResult<Self> {
+        path::Path::numbers(&scenario.0, &changes)
+            .map(Self)
+            .map_err(refused)
+    }
+
+    /// A support that moves through poses, each a position and a rotation vector, as a screw or straight.
+    ///
+    /// Errors: `ValueError`, one line.
+    #[staticmethod]
+    fn poses(
+        scenario: &Scenario,
+        support: usize,
+        poses: Vec<([f64; 3], [f64; 3])>,
+        screw: bool,
+    ) -> PyResult<Self> {
+        let poses: Vec<_> = poses
+            .into_iter()
+            .map(|(position, rotation)| (Vector3::from(position), Vector3::from(rotation)))
+            .collect();
+        let motion = if screw {
+            Motion::Screw
+        } else {
+            Motion::Straight
+        };
+        path::Path::poses(&scenario.0, support, &poses, motion)
+            .map(Self)
+            .map_err(refused)
+    }
+}
+
+/// Follows an equilibrium along a path with the GIL released; `progress(branch, share of the path)` is called now and then.
+///
+/// Errors: `ValueError`, one line, where there is nothing to follow; whatever `progress` or a signal handler raises.
+#[pyfunction]
+#[pyo3(signature = (equilibrium, path, step, states, branches, progress=None))]
+pub(crate) fn follow(
+    py: Python<'_>,
+    equilibrium: &Equilibrium,
+    path: &Path,
+    step: f64,
+    states: usize,
+    branches: usize,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Diagram> {
+    let settings = Settings {
+        step,
+        states,
+        branches,
+    };
+    let mut signals = Signals::new();
+    let found = py.detach(|| {
+        let proceed = &mut |branch: usize, place: f64| {
+            let share = place / path.0.length();
+            signals.proceed_with(|py| match &progress {
+                Some(progress) => progress.call1(py, (branch, share)).map(drop),
+                None => Ok(()),
+            })
+        };
+        core::follow(equilibrium.core(), &path.0, &settings, proceed)
+    });
+    match signals.raised {
+        Some(error) => Err(error),
+        None => found.map(Diagram).map_err(refused),
+    }
+}
+
+fn refused(error: impl std::error::Error) -> PyErr {
+    PyValueError::new_err(error.to_string())
+}
+
+/// The branches of equilibria along a path.
+#[pyclass(frozen, module = "fishbone._core")]
+pub(crate) struct Diagram(core::Diagram);
+
+/// Kind, parameter, state, negative modes before and after, and what it snaps to with its parameter.
+type Event = (
+    &'static str,
+    f64,
+    usize,
+    (usize, usize),
+    Option<(f64, Scenario, Equilibrium)>,
+);
+
+/// Parameter, energy, height, forces and moments of the supports, least bend radius, least radius on the spine, rib margin.
+type Report<'py> = (
+    Scalars<'py>,
+    Scalars<'py>,
+    Scalars<'py>,
+    Grid<'py>,
+    Grid<'py>,
+    Scalars<'py>,
+    Scalars<'py>,
+    Scalars<'py>,
+);
+
+#[pymethods]
+impl Diagram {
+    /// Number of branches.
+    #[getter]
+    fn branches(&self) -> usize {
+        self.0.branches.len()
+    }
+
+    /// Number of states of a branch.
+    fn states(&self, branch: usize) -> usize {
+        self.0.branches[branch].states.len()
+    }
+
+    /// (branch, event) where a branch begins.
+    fn origin(&self, branch: usize) -> Option<(usize, usize)> {
+        let origin = self.0.branches[branch].origin?;
+        Some((origin.branch, origin.event))
+    }
+
+    /// Why a branch ends.
+    fn end(&self, branch: usize) -> &'static str {
+        match self.0.branches[branch].end {
+            End::Range => "range",
+            End::Closed => "closed",
+            End::Budget => "budget",
+            End::Lost => "lost",
+            End::Interrupted => "interrupted",
+        }
+    }
+
+    /// Negative modes of every state of a branch.
+    fn negative_modes(&self, branch: usize) -> Vec<usize> {
+        let states = self.0.branches[branch].states.iter();
+        states.map(|state| state.negative_modes).collect()
+    }
+
+    /// The events of a branch.
+    fn events(&self, branch: usize) -> Vec<Event> {
+        let event = |event: &core::Event| {
+            let [before, after] = event.negative_modes;
+            let snapped = event.snapped.as_ref().map(|snapped| {
+                let equilibrium = snapped.equilibrium.clone();
+                let scenario = Scenario(equilibrium.scenario.clone());
+                let parameter = self.0.path.parameter(snapped.place);
+                (parameter, scenario, Equilibrium::of(|| equilibrium))
+            });
+            let parameter = self.0.path.parameter(event.place);
+            (
+                event.kind.name(),
+                parameter,
+                event.state,
+                (before, after),
+                snapped,
+            )
+        };
+        self.0.branches[branch].events.iter().map(event).collect()
+    }
+
+    /// What is to be reported of all states of a branch.
+    ///
+    /// Shapes: (m,) each, forces and moments (m, supports, 3); NaN where nothing bends.
+    fn report<'py>(&self, py: Python<'py>, branch: usize) -> PyResult<Report<'py>> {
+        let states = 0..self.0.branches[branch].states.len();
+        let summaries: Vec<Summary> = py.detach(|| {
+            let summary = |state| self.0.summary(branch, state);
+            states.map(summary).collect()
+        });
+        let column = |of: fn(&Summary) -> f64| -> Scalars<'py> {
+            summaries
+                .iter()
+                .map(of)
+                .collect::<Vec<_>>()
+                .into_pyarray(py)
+        };
+        let supports = summaries.first().map_or(0, |first| first.reactions.len());
+        let wrenches = || summaries.iter().flat_map(|summary| &summary.reactions);
+        Ok((
+            column(|s| s.parameter),
+            column(|s| s.energy),
+            column(|s| s.height),
+            array::grid(py, supports, wrenches().map(|wrench| wrench.force))?,
+            array::grid(py, supports, wrenches().map(|wrench| wrench.moment))?,
+            column(|s| s.least_bend_radius.unwrap_or(f64::NAN)),
+            column(|s| s.least_spine_radius.unwrap_or(f64::NAN)),
+            column(|s| s.rib_margin),
+        ))
+    }
+
+    /// Spine positions of all states of a branch.
+    ///
+    /// Shapes: (n, 3) each.
+    fn positions<'py>(&self, py: Python<'py>, branch: usize) -> Vec<Points<'py>> {
+        let states = 0..self.0.branches[branch].states.len();
+        let positions = |state| {
+            let equilibrium = self.0.equilibrium(branch, state);
+            array::points(py, equilibrium.spine.pose.iter().map(|pose| &pose.position))
+        };
+        states.map(positions).collect()
+    }
+
+    /// The scenario of a state and all that is to be known of its equilibrium.
+    fn equilibrium(&self, py: Python<'_>, branch: usize, state: usize) -> (Scenario, Equilibrium) {
+        py.detach(|| {
+            let found = Equilibrium::of(|| self.0.equilibrium(branch, state));
+            (Scenario(found.scenario().clone()), found)
+        })
+    }
+}
