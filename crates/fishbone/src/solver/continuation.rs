@@ -365,12 +365,6 @@ impl<'a, F: Family> Continuation<'a, F> {
                 false => high = next,
             }
         }
-        if std::env::var("D").is_ok() {
-            eprintln!(
-                "{turn:?} {} {} | {} {}",
-                low.station.parameter, low.value, high.station.parameter, high.value
-            );
-        }
         let share = low.value / (low.value - high.value);
         let [a, b] = [&low, &high].map(|place| place.station.parameter);
         let nearest = if share < 0.5 { low } else { high };
