@@ -127,6 +127,17 @@ impl Units {
     }
 }
 
+/// Where a search begins.
+#[derive(Clone, Copy)]
+enum Start<'a> {
+    /// At the guess.
+    Guess,
+    /// At a shape near to a minimum; anew where that leads to none.
+    Near(&'a BeltPoint),
+    /// At a shape that need not be near to any, and nowhere else.
+    Shape(&'a BeltPoint),
+}
+
 /// Finds an equilibrium of a scenario that [`Scenario::validate`] passes.
 ///
 /// `proceed` is asked once an iteration whether to go on; `Break` ends the solve as not converged.
@@ -139,7 +150,7 @@ impl Units {
 pub fn solve(scenario: &Scenario, proceed: &mut dyn FnMut() -> ControlFlow<()>) -> Equilibrium {
     let belt = Belt::new(&scenario.belt).expect("a validated scenario");
     match scenario.solver.method {
-        Method::Intrinsic => intrinsic::solve(scenario, &belt, None, proceed),
+        Method::Intrinsic => intrinsic::solve(scenario, &belt, Start::Guess, proceed),
         Method::Ritz => ritz::solve(scenario, &belt, proceed),
     }
 }
@@ -151,7 +162,17 @@ pub(crate) fn solve_from(
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Equilibrium {
     let belt = Belt::new(&scenario.belt).expect("a validated scenario");
-    intrinsic::solve(scenario, &belt, Some(shape), proceed)
+    intrinsic::solve(scenario, &belt, Start::Near(shape), proceed)
+}
+
+/// The minimum that a search finds from a shape on the scenario's mesh, and from nowhere else.
+pub(crate) fn minimum_from(
+    scenario: &Scenario,
+    shape: &BeltPoint,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Equilibrium {
+    let belt = Belt::new(&scenario.belt).expect("a validated scenario");
+    intrinsic::solve(scenario, &belt, Start::Shape(shape), proceed)
 }
 
 /// The equilibrium of a solution that was found by other means.

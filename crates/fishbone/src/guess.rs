@@ -295,6 +295,21 @@ pub(crate) fn disturb(program: &BeltProgram, point: &BeltPoint, share: f64) -> B
     inside(program, disturbed)
 }
 
+/// A belt with a share of its own bend kept and bend and slope added by u in U, its ribs brought back to where they do not cross.
+pub(crate) fn waved(
+    program: &BeltProgram,
+    base: &BeltPoint,
+    kept: f64,
+    added: &dyn Fn(f64) -> Vector2<f64>,
+) -> BeltPoint {
+    let mut waved = base.clone();
+    for (fields, u) in waved.fields.iter_mut().zip(program.nodes()) {
+        fields[0] *= kept;
+        *fields += added(u);
+    }
+    inside(program, waved)
+}
+
 /// Whether a belt is not bent at a node.
 pub(crate) fn is_flat(fields: &Vector2<f64>) -> bool {
     const FLAT: f64 = 1e-6;

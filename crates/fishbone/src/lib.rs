@@ -28,6 +28,7 @@
 //! ```
 
 pub mod belt;
+pub mod branches;
 pub mod element;
 pub mod energy;
 pub mod equilibrium;

@@ -4,8 +4,8 @@ use super::apart::{keep_apart, unsettled};
 use super::assembly::Assembly;
 use super::search::{Search, is_flat_under_load};
 use super::{
-    Equilibrium, LinkForce, Reaction, Solved, Status, Units, Wrench, excess_distance, is_taut,
-    number,
+    Equilibrium, LinkForce, Reaction, Solved, Start, Status, Units, Wrench, excess_distance,
+    is_taut, number,
 };
 use crate::belt::Belt;
 use crate::guess::{disturb, guess};
@@ -23,11 +23,11 @@ const CLEARLY_MISSED: f64 = 1e-6;
 const CROSSING: &str = "no ribs found that do not cross: the bends, arcs and square ribs of the board are too close together \
                         for its width; make it narrower or the segments longer";
 
-/// Finds a minimum of the energy in the two fields, from a shape on the scenario's mesh or, without one, from the guess.
+/// Finds a minimum of the energy in the two fields.
 pub(super) fn solve(
     scenario: &Scenario,
     belt: &Belt,
-    from: Option<&BeltPoint>,
+    from: Start,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Equilibrium {
     let assembly = Assembly::new(scenario, belt);
@@ -144,14 +144,15 @@ fn start(scenario: &Scenario, assembly: &Assembly) -> Found {
 fn find(
     scenario: &Scenario,
     assembly: &Assembly,
-    from: Option<&BeltPoint>,
+    from: Start,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> (Found, Option<f64>) {
     let search = Search::of(scenario);
     let mut program = assembly.program(scenario.elements());
     let solution = match from {
-        Some(shape) => search.from(&program, shape.clone(), proceed),
-        None => {
+        Start::Near(shape) => search.from(&program, shape.clone(), proceed),
+        Start::Shape(shape) => search.only_from(&program, shape.clone(), proceed),
+        Start::Guess => {
             let finer = scenario.elements() > scenario.default_elements();
             let coarse = finer.then(|| assembly.program(scenario.default_elements()));
             search.run(&program, coarse.as_ref(), proceed)

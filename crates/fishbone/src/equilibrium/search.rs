@@ -94,6 +94,16 @@ impl Search {
         better(near, |_| self.cold(program, proceed))
     }
 
+    /// Searches from a shape of the same mesh that need not be near to a minimum, and from nowhere else.
+    pub(super) fn only_from(
+        &self,
+        program: &BeltProgram,
+        point: BeltPoint,
+        proceed: &mut Proceed,
+    ) -> Solution<BeltPoint> {
+        self.minimise(program, inside(program, point), COLD, proceed)
+    }
+
     /// Searches from the guess, then from other starts, until a minimum is found; the best that was found otherwise.
     fn cold(&self, program: &BeltProgram, proceed: &mut Proceed) -> Solution<BeltPoint> {
         let start = match program.half_turns {

@@ -23,7 +23,8 @@ pub use follow::{Followed, Follower, Shape};
 pub use inertia::Inertia;
 pub use interior_point::{assess, minimise};
 pub use kkt::{Kkt, KktVector, Singular};
-pub use modes::{Mode, lowest_modes};
+pub use modes::{Mode, lowest_modes, moved};
+pub use push::pushed_over;
 pub use rank::dependent_constraints;
 
 use chain::{Chain, Diagonal, NodeMatrix, NodeTerm, NodeVector, Stage};

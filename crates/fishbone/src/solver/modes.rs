@@ -56,6 +56,13 @@ pub(super) fn lowest_modes_of(mut kkt: Kkt, count: usize) -> Result<Vec<Mode>, S
     Ok(subspace)
 }
 
+/// A point moved so far along a mode.
+pub fn moved<P: Program>(program: &P, point: &P::Point, mode: &Mode, length: f64) -> P::Point {
+    let mut moved = point.clone();
+    program.retract(point, &mode.motion, length, &mut moved);
+    moved
+}
+
 /// Shifts the system to where no eigenvalue is below, and says by how much.
 fn shift_below_all(kkt: &mut Kkt) -> Result<f64, Singular> {
     const FIRST: f64 = -100.0;

@@ -20,7 +20,7 @@ struct Push<'a, P> {
 
 /// The stationary point that is reached from another by a push along a mode, or against it, of which the strength is followed
 /// until it is nothing again; `None` where it never is, or only where it began.
-pub(super) fn pushed_over<P: Program + Clone>(
+pub fn pushed_over<P: Program + Clone>(
     program: &P,
     tolerance: f64,
     from: &Stationary<P::Point>,
