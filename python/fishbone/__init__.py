@@ -9,6 +9,7 @@ import importlib
 from types import ModuleType
 
 from fishbone._core import __version__
+from fishbone.branches import branches
 from fishbone.equilibrium import (
     BendRadius,
     Edges,
@@ -67,6 +68,7 @@ __all__ = [
     "Tracker",
     "Update",
     "__version__",
+    "branches",
     "load",
     "solve",
     "solve_many",

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 
 from fishbone import _core
-from fishbone.errors import InvalidArgument, NoModes, NoSensitivity, NoSupport, NotConverged
+from fishbone.errors import InvalidArgument, InvalidScenario, NoModes, NoSensitivity, NoSupport, NotConverged
 from fishbone.sensitivity import Sensitivity
 
 if TYPE_CHECKING:
@@ -87,8 +87,8 @@ class Residuals(NamedTuple):
 class Mode(NamedTuple):
     """A motion from an equilibrium that the second variation of the energy does not couple with other modes.
 
-    Its scale is such that the mean over the board of the squared displacement is 1, the board taken as a strip across the
-    spine that turns with the frame, all of it weighing alike. n is the number of nodes.
+    Its scale is such that the mean over the board of the squared displacement is 1, the board taken as a strip across
+    the spine that turns with the frame, all of it weighing alike. n is the number of nodes.
     """
 
     eigenvalue: float
@@ -187,14 +187,14 @@ class Equilibrium:
     def stable(self) -> bool | None:
         """Whether the equilibrium is a local minimum; None where that cannot be decided.
 
-        So it is where it has a mode of no second variation, and where a part of the belt is flat under stress: there any
-        slope of the ribs is as good as any other, and along which of them the belt would give way is not seen.
+        So it is where it has a mode of no second variation, and where a part of the belt is flat under stress: there
+        any slope of the ribs is as good as any other, and along which of them the belt would give way is not seen.
         """
         return self._inner.stable
 
     @property
     def negative_modes(self) -> int | None:
-        """Number of independent motions, of those that supports and touching ribs leave, along which the energy falls."""
+        """Number of independent motions, of those that supports and touching ribs leave, by which the energy falls."""
         return self._inner.negative_modes
 
     @property
@@ -202,11 +202,24 @@ class Equilibrium:
         """Number of independent motions along which the energy stays, to second order."""
         return self._inner.zero_modes
 
+    def refined(self, elements: int) -> Equilibrium | None:
+        """The same equilibrium, stable or not, with another number of elements; None where there is none like it.
+
+        Errors: `InvalidArgument` where `elements` is none that a scenario takes.
+        """
+        tables = self.scenario.to_dict()
+        tables["solver"]["elements"] = elements
+        try:
+            scenario = type(self.scenario).from_dict(tables)
+        except InvalidScenario as error:
+            raise InvalidArgument(str(error)) from None
+        found = self._inner.refined(elements)
+        return None if found is None else Equilibrium(scenario, found[1])
+
     def modes(self, count: int) -> list[Mode]:
         """The lowest modes, rising: fewer where the mesh has no more.
 
-        Errors: `NoModes` unless the solve has converged by the intrinsic method; `InvalidArgument` where `count` is below
-        1.
+        Errors: `NoModes` unless the solve has converged by the intrinsic method; `InvalidArgument` for a count below 1.
         """
         if not 1 <= count <= MAX_MODES:
             raise InvalidArgument(f"count: found {count}, allowed 1 to {MAX_MODES}")
@@ -492,18 +505,38 @@ class Equilibrium:
         return f"<Equilibrium: {self.status}, energy {self.energy:.5g}, {self.iterations} iterations>"
 
 
-def solve(scenario: Scenario, *, strict: bool = False) -> Equilibrium:
+def solve(
+    scenario: Scenario, *, start: tuple[npt.ArrayLike, npt.ArrayLike] | None = None, strict: bool = False
+) -> Equilibrium:
     """Finds the equilibrium of a scenario; a failure is a value too, see `Equilibrium.status`.
 
-    Other threads run meanwhile, and Ctrl-C ends the solve.
+    The search begins at an arch on the side of the scenario's `bulge` or, where `start` is given, at that shape and
+    nowhere else: bend and rib slope at equal steps of the arc length, from the start of the belt to its end. Other
+    threads run meanwhile, and Ctrl-C ends the solve.
 
+    Shapes: start (m,) and (m,), m at least 2.
     Errors: `NotConverged`, which carries the equilibrium, where `strict` is asked for; `InvalidArgument` where
-    `scenario` is none.
+    `scenario` is none or `start` no shape.
     """
-    equilibrium = Equilibrium(scenario, _core.solve(_core_of(scenario)))
+    core = core_of(scenario)
+    inner = _core.solve(core) if start is None else _core.solve_from(core, *_shape(start))
+    equilibrium = Equilibrium(scenario, inner)
     if strict and equilibrium.status != "converged":
         raise NotConverged(equilibrium)
     return equilibrium
+
+
+def _shape(start: tuple[npt.ArrayLike, npt.ArrayLike]) -> tuple[list[float], list[float]]:
+    """Bend and rib slope of a start, checked."""
+    try:
+        bend, slope = (np.asarray(field, dtype=np.float64) for field in start)
+    except (TypeError, ValueError):
+        raise InvalidArgument("start: found no pair of arrays, allowed bend and rib slope") from None
+    if bend.shape != slope.shape or bend.ndim != 1 or len(bend) < 2:  # noqa: PLR2004 - a start and an end
+        raise InvalidArgument(f"start: found shapes {bend.shape} and {slope.shape}, allowed (m,) twice, m at least 2")
+    if not (np.isfinite(bend).all() and np.isfinite(slope).all()):
+        raise InvalidArgument("start: found what is not finite, allowed finite numbers")
+    return bend.tolist(), slope.tolist()
 
 
 def solve_many(
@@ -517,11 +550,15 @@ def solve_many(
     Errors: `InvalidArgument` where one of `scenarios` is none; whatever `progress` raises.
     """
     scenarios = list(scenarios)
-    found = _core.solve_many([_core_of(scenario) for scenario in scenarios], progress)
+    found = _core.solve_many([core_of(scenario) for scenario in scenarios], progress)
     return [Equilibrium(scenario, inner) for scenario, inner in zip(scenarios, found, strict=True)]
 
 
-def _core_of(scenario: Scenario) -> _core.Scenario:
+def core_of(scenario: Scenario) -> _core.Scenario:
+    """The core's scenario behind one.
+
+    Errors: `InvalidArgument` where it is none.
+    """
     inner = getattr(scenario, "_inner", None)
     if not isinstance(inner, _core.Scenario):
         raise InvalidArgument(f"scenario: found {type(scenario).__name__}, allowed a Scenario, as fishbone.load gives")

@@ -30,6 +30,29 @@ pub(crate) fn solve(py: Python<'_>, scenario: &Scenario) -> PyResult<Equilibrium
     }
 }
 
+/// Solves a scenario from a shape with the GIL released: bend and rib slope at equal steps of the arc length.
+///
+/// Shapes: (m,) both.
+/// Errors: whatever a signal handler raises, `KeyboardInterrupt` first of all.
+#[pyfunction]
+pub(crate) fn solve_from(
+    py: Python<'_>,
+    scenario: &Scenario,
+    bend: Vec<f64>,
+    rib_slope: Vec<f64>,
+) -> PyResult<Equilibrium> {
+    let mut signals = Signals::new();
+    let found = py.detach(|| {
+        Equilibrium::of(|| {
+            equilibrium::solve_from(&scenario.0, &bend, &rib_slope, &mut || signals.proceed())
+        })
+    });
+    match signals.raised {
+        Some(error) => Err(error),
+        None => Ok(found),
+    }
+}
+
 /// The name of a status in results.
 pub(crate) fn status_name(status: Status) -> &'static str {
     match status {
@@ -418,6 +441,23 @@ impl Equilibrium {
             .filter(|(_, piece)| matches!(piece, Piece::Rigid))
             .map(|(element, _)| (spine.u[element], spine.u[element + 1]))
             .collect()
+    }
+
+    /// The scenario with another number of elements and the same equilibrium there; None where there is none like it.
+    ///
+    /// Errors: whatever a signal handler raises, `KeyboardInterrupt` first of all.
+    fn refined(&self, py: Python<'_>, elements: usize) -> PyResult<Option<(Scenario, Self)>> {
+        let mut signals = Signals::new();
+        let start = Instant::now();
+        let found = py.detach(|| self.solved.refined(elements, &mut || signals.proceed()));
+        let solve_time = start.elapsed().as_secs_f64();
+        match signals.raised {
+            Some(error) => Err(error),
+            None => Ok(found.map(|solved| {
+                let scenario = Scenario(solved.scenario.clone());
+                (scenario, Self { solved, solve_time })
+            })),
+        }
     }
 
     /// (eigenvalue, translation, rotation, bend, rib slope) of the lowest modes, found with the GIL released.

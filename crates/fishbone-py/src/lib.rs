@@ -2,6 +2,7 @@
 
 mod array;
 mod batch;
+mod branches;
 mod equilibrium;
 mod follow;
 mod scenario;
@@ -14,7 +15,9 @@ mod _core {
     #[pymodule_export]
     use crate::batch::solve_many;
     #[pymodule_export]
-    use crate::equilibrium::{Equilibrium, solve};
+    use crate::branches::branches;
+    #[pymodule_export]
+    use crate::equilibrium::{Equilibrium, solve, solve_from};
     #[pymodule_export]
     use crate::follow::{Diagram, Path, follow};
     #[pymodule_export]

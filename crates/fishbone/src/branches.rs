@@ -6,6 +6,7 @@
 
 use crate::equilibrium::{Equilibrium, Status, is_settled, minimum_from, of_solution, program_of};
 use crate::guess::{guess, waved};
+use crate::lie::Pose;
 use crate::program::{BeltPoint, BeltProgram};
 use crate::scenario::{Method, Scenario};
 use crate::solver::{self, Mode, Stationary};
@@ -16,8 +17,10 @@ use std::ops::ControlFlow;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Most pushes.
-const PUSHES: usize = 400;
+/// Most equilibria that are pushed.
+const PUSHED: usize = 16;
+/// So many at a time, so that lower ones that are found meanwhile come first.
+const AT_A_TIME: usize = 4;
 /// Most negative modes of what is told.
 const HIGHEST_INDEX: usize = 2;
 /// Modes along which an equilibrium is pushed, by its number of negative modes.
@@ -65,6 +68,7 @@ pub fn branches(scenario: &Scenario, run: &Run, watch: &dyn Watch) -> Vec<Equili
     census.enter(first.clone());
     census.start();
     census.push();
+    census.confirm();
     let mut found = census.found;
     if found.is_empty() {
         return vec![first];
@@ -138,32 +142,80 @@ impl Census<'_> {
         }
     }
 
-    /// Pushes what was found along its lowest modes, and what is found so, until nothing new is.
+    /// Kicks and pushes what was found along its lowest modes, the lowest in energy first, and what is found so in turn.
     fn push(&mut self) {
-        let (mut from, mut pushes) = (0, 0);
-        while from < self.found.len() && pushes < PUSHES {
-            let new = self.found[from..].to_vec();
-            from = self.found.len();
-            let modes = self.each(&new, lowest_modes);
-            let tasks: Vec<_> = new
+        let mut pushed: Vec<f64> = Vec::new();
+        while pushed.len() < PUSHED {
+            let is_new = |e: &&Equilibrium| !pushed.contains(&e.energy);
+            let mut next: Vec<_> = self.found.iter().filter(is_new).cloned().collect();
+            next.sort_by(|a, b| a.energy.total_cmp(&b.energy));
+            next.truncate(AT_A_TIME);
+            if next.is_empty() {
+                return;
+            }
+            pushed.extend(next.iter().map(|equilibrium| equilibrium.energy));
+            let modes = self.each(&next, lowest_modes);
+            let tasks: Vec<_> = next
                 .iter()
                 .zip(&modes)
                 .flat_map(|(equilibrium, modes)| {
                     let sided = modes.iter().flat_map(|mode| [(mode, true), (mode, false)]);
                     sided.map(move |(mode, forth)| (equilibrium, mode, forth))
                 })
-                .take(PUSHES - pushes)
                 .collect();
-            pushes += tasks.len();
             let (scenario, watch) = (self.scenario, self.watch);
             let found = self.each(&tasks, |(equilibrium, mode, forth)| {
-                pushed(scenario, equilibrium, mode, *forth, watch)
+                let mut found = kicked(scenario, equilibrium, mode, *forth, watch);
+                found.extend(pushed_over(scenario, equilibrium, mode, *forth, watch));
+                found
             });
             for equilibrium in found.into_iter().flatten() {
                 self.enter(equilibrium);
             }
         }
     }
+}
+
+impl Census<'_> {
+    /// Keeps what a mesh twice as fine has too, each once.
+    fn confirm(&mut self) {
+        let found = std::mem::take(&mut self.found);
+        let watch = self.watch;
+        let fine = self.each(&found, |found| {
+            on_finer_mesh(found, &mut || watch.proceed())
+        });
+        let mut known: Vec<Equilibrium> = Vec::new();
+        for (found, fine) in found.into_iter().zip(fine) {
+            if let Some(fine) = fine
+                && !known.iter().any(|known| is_twin(known, &fine))
+            {
+                known.push(fine);
+                self.found.push(found);
+            }
+        }
+    }
+}
+
+/// The same equilibrium on a mesh twice as fine; `None` where there is none like it.
+fn on_finer_mesh(
+    found: &Equilibrium,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Option<Equilibrium> {
+    /// Farther off, in U, and with another energy, as a share, it is another one.
+    const NEAR: f64 = 0.03;
+    const LEVEL: f64 = 0.02;
+    let fine = found.refined(2 * found.scenario.elements(), proceed)?;
+    let is_level = (fine.energy - found.energy).abs() <= LEVEL * found.energy.abs();
+    let length = found.spine.length();
+    let moves = |(u, pose): (&f64, &Pose)| {
+        let same = fine
+            .spine
+            .u
+            .partition_point(|other| *other < u - 1e-9 * length);
+        (fine.spine.pose[same].position - pose.position).norm() / length
+    };
+    let places = found.spine.u.iter().zip(&found.spine.pose);
+    (is_level && places.map(moves).fold(0.0, f64::max) <= NEAR).then_some(fine)
 }
 
 /// The modes along which an equilibrium is pushed.
@@ -177,8 +229,27 @@ fn lowest_modes(equilibrium: &Equilibrium) -> Vec<Mode> {
     modes.unwrap_or_default()
 }
 
+/// The minima that are found from where an equilibrium has been displaced far along a mode.
+fn kicked(
+    scenario: &Scenario,
+    from: &Equilibrium,
+    mode: &Mode,
+    forth: bool,
+    watch: &dyn Watch,
+) -> Vec<Equilibrium> {
+    const FAR: [f64; 2] = [0.1, 0.3];
+    let sign = if forth { 1.0 } else { -1.0 };
+    let solved = from.solved.iter();
+    let starts = solved.flat_map(|solved| {
+        FAR.map(|far| solver::moved(&solved.program, &solved.at.point, mode, sign * far))
+    });
+    starts
+        .map(|start| minimum_from(scenario, &start, &mut || watch.proceed()))
+        .collect()
+}
+
 /// The equilibrium that a push leads to and, where that is a saddle, the minima downhill on either side.
-fn pushed(
+fn pushed_over(
     scenario: &Scenario,
     from: &Equilibrium,
     mode: &Mode,
@@ -236,42 +307,92 @@ fn height(equilibrium: &Equilibrium) -> f64 {
     equilibrium.highest_point().position.dot(&bulge.normalize())
 }
 
-/// Shapes from which to search: arches to both sides and the straight belt, with waves of bend and of rib slope over them.
+/// Shapes from which to search: arches to both sides and the straight belt with waves of bend and of rib slope over them,
+/// then sums of waves that cover the space of such sums evenly.
 fn starts(scenario: &Scenario) -> Vec<BeltPoint> {
-    /// Amplitude of a wave of bend by half its number of half waves.
-    const BEND: f64 = 4.0;
-    const SLOPES: [f64; 2] = [0.4, 1.2];
     let program = program_of(scenario, scenario.elements());
     let bulge = Vector3::from(scenario.solver.bulge);
     let [up, down] = [bulge, -bulge].map(|bulge| guess(&program, &bulge));
-    let flat = waved(&program, &up, 0.0, &|_| Vector2::zeros());
-    let bends = (0..5).flat_map(|waves: i32| {
-        let size = BEND * f64::from(waves.max(1));
-        let signs: &[f64] = if waves == 0 { &[0.0] } else { &[1.0, -1.0] };
-        signs
-            .iter()
-            .map(move |sign| (f64::from(waves), sign * size))
-    });
-    let bends: Vec<_> = bends.collect();
-    let mut slopes = vec![(1.0, 0.0)];
-    for slope in SLOPES {
-        for waves in [1.0, 2.0, 3.0] {
-            slopes.extend([(waves, slope), (waves, -slope)]);
-        }
-    }
     let mut starts = Vec::new();
-    for (base, kept) in [(&up, 1.0), (&down, 1.0), (&flat, 0.0)] {
-        for (bend_waves, bend) in &bends {
-            for (slope_waves, slope) in &slopes {
-                let wave = |u: f64| {
+    for (base, kept) in [(&up, 1.0), (&down, 1.0), (&up, 0.0)] {
+        for (bend_waves, bend) in BENDS {
+            for (slope_waves, slope) in SLOPES {
+                starts.push(waved(&program, base, kept, &|u| {
                     Vector2::new(
                         bend * (PI * bend_waves * u).cos(),
                         slope * (PI * slope_waves * u).sin(),
                     )
-                };
-                starts.push(waved(&program, base, kept, &wave));
+                }));
             }
         }
     }
+    starts.extend((0..SUMS).map(|i| {
+        let sum = Sum::new(i);
+        waved(&program, &up, 0.0, &|u| sum.at(u))
+    }));
     starts
+}
+
+/// Waves of bend: half waves along the belt, and amplitude in 1/U.
+const BENDS: [(f64, f64); 9] = [
+    (0.0, 0.0),
+    (0.0, 4.0),
+    (0.0, -4.0),
+    (1.0, 4.0),
+    (1.0, -4.0),
+    (2.0, 8.0),
+    (2.0, -8.0),
+    (3.0, 12.0),
+    (3.0, -12.0),
+];
+/// Waves of rib slope: half waves along the belt, and amplitude.
+const SLOPES: [(f64, f64); 5] = [(1.0, 0.0), (1.0, 0.5), (1.0, -0.5), (2.0, 0.5), (2.0, -0.5)];
+/// Number of sums of waves.
+const SUMS: usize = 1500;
+/// Number of waves in each.
+const WAVES: usize = 5;
+
+/// Sums of waves of bend and rib slope.
+struct Sum {
+    /// Amplitude and phase of every wave of bend, then of slope.
+    waves: [[(f64, f64); WAVES]; 2],
+}
+
+impl Sum {
+    /// The i-th of a sequence that covers all evenly: bends up to that of a ring and slopes up to 0.5, root mean square.
+    ///
+    /// Source: M. Roberts, "The unreasonable effectiveness of quasirandom sequences" (2018).
+    fn new(i: usize) -> Self {
+        const NUMBERS: usize = 2 + 4 * WAVES;
+        // The root of x^(d+1) = x + 1, d the number of dimensions.
+        let mut root: f64 = 1.0;
+        for _ in 0..50 {
+            root = (1.0 + root).powf(1.0 / (NUMBERS as f64 + 1.0));
+        }
+        let mut ratio = 1.0;
+        let mut next = || {
+            ratio /= root;
+            (0.5 + (i as f64 + 1.0) * ratio).fract()
+        };
+        let sizes = [2.0 * PI * next(), 0.5 * next()];
+        let waves = sizes.map(|size| {
+            let mut waves = [(0.0, 0.0); WAVES];
+            for wave in &mut waves {
+                *wave = (2.0 * next() - 1.0, 2.0 * PI * next());
+            }
+            let norm = waves.iter().map(|wave| wave.0 * wave.0).sum::<f64>().sqrt();
+            waves.map(|(amplitude, phase)| (size * 2f64.sqrt() * amplitude / norm, phase))
+        });
+        Self { waves }
+    }
+
+    fn at(&self, u: f64) -> Vector2<f64> {
+        let [bend, slope] = self.waves.map(|waves| {
+            let wave = |(k, (amplitude, phase)): (usize, &(f64, f64))| {
+                amplitude * (PI * k as f64 * u + phase).cos()
+            };
+            waves.iter().enumerate().map(wave).sum()
+        });
+        Vector2::new(bend, slope)
+    }
 }

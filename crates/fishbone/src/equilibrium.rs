@@ -7,12 +7,13 @@ mod ritz;
 mod search;
 
 use crate::belt::Belt;
+use crate::guess::{guess, waved};
 use crate::program::{BeltPoint, BeltProgram};
 use crate::scenario::{BeltSpec, LinkSpec, Method, Scenario, SupportSpec};
-use crate::solver::{Inertia, Residuals, Solution, Stationary};
+use crate::solver::{self, Inertia, Residuals, Solution, Stationary};
 use crate::spine::Spine;
 use crate::stability::Stability;
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 use serde::Serialize;
 use std::ops::ControlFlow;
 
@@ -127,6 +128,37 @@ impl Units {
     }
 }
 
+impl Equilibrium {
+    /// The same equilibrium, minimum or not, on a mesh of another number of elements; `None` where none is found next to it.
+    ///
+    /// `proceed` is asked once an iteration whether to go on.
+    pub fn refined(
+        &self,
+        elements: usize,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Option<Self> {
+        let solved = self.solved.as_ref()?;
+        let mut scenario = self.scenario.clone();
+        scenario.solver.elements = Some(elements);
+        let program = program_of(&scenario, elements);
+        let shape = search::prolong(&solved.program, &solved.at.point, &program);
+        if self.stability.is_none_or(|s| s.negative_modes == 0) {
+            let belt = Belt::new(&scenario.belt)?;
+            let found = intrinsic::solve(&scenario, &belt, Start::Close(&shape), proceed);
+            return (found.status == Status::Converged).then_some(found);
+        }
+        let (from, bounds) = (&solved.program, &solved.at.bound_multipliers);
+        let at = Stationary {
+            point: shape,
+            multipliers: solved.at.multipliers.clone(),
+            bound_multipliers: search::prolong_bounds(from, bounds, &program),
+        };
+        let solution = solver::settle(&program, scenario.solver.tolerance, at)?;
+        let is_like = solution.inertia == solved.inertia;
+        is_like.then(|| of_solution(&scenario, program, solution))
+    }
+}
+
 /// Where a search begins.
 #[derive(Clone, Copy)]
 enum Start<'a> {
@@ -136,6 +168,8 @@ enum Start<'a> {
     Near(&'a BeltPoint),
     /// At a shape that need not be near to any, and nowhere else.
     Shape(&'a BeltPoint),
+    /// At a shape very near to a minimum, and nowhere else.
+    Close(&'a BeltPoint),
 }
 
 /// Finds an equilibrium of a scenario that [`Scenario::validate`] passes.
@@ -155,8 +189,41 @@ pub fn solve(scenario: &Scenario, proceed: &mut dyn FnMut() -> ControlFlow<()>) 
     }
 }
 
-/// The same from a shape on the scenario's mesh in place of the guess.
-pub(crate) fn solve_from(
+/// The same from a shape in place of the guess, and from nowhere else: bend and rib slope at equal steps of the arc length
+/// from start to end. Where it has no first-order conditions, the source's method takes no heed of it.
+///
+/// # Panics
+///
+/// If the scenario asks for what [`Scenario::validate`] refuses, or there are not as many slopes as bends, or fewer than two.
+pub fn solve_from(
+    scenario: &Scenario,
+    bend: &[f64],
+    rib_slope: &[f64],
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Equilibrium {
+    assert!(bend.len() == rib_slope.len() && bend.len() > 1);
+    let belt = Belt::new(&scenario.belt).expect("a validated scenario");
+    match scenario.solver.method {
+        Method::Intrinsic => {
+            let program = program_of(scenario, scenario.elements());
+            let guess = guess(&program, &Vector3::from(scenario.solver.bulge));
+            let shape = waved(&program, &guess, 0.0, &|u| {
+                let at = |values: &[f64]| {
+                    let place = u * (values.len() - 1) as f64;
+                    let before = (place as usize).min(values.len() - 2);
+                    let share = place - before as f64;
+                    values[before] + share * (values[before + 1] - values[before])
+                };
+                Vector2::new(at(bend) * belt.length(), at(rib_slope))
+            });
+            intrinsic::solve(scenario, &belt, Start::Shape(&shape), proceed)
+        }
+        Method::Ritz => ritz::solve(scenario, &belt, proceed),
+    }
+}
+
+/// The same from a shape on the scenario's mesh that is near to a minimum; anew where it leads to none.
+pub(crate) fn solve_near(
     scenario: &Scenario,
     shape: &BeltPoint,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,

@@ -1,6 +1,6 @@
 //! Follows an equilibrium at the rate of a robot while one of its supports moves.
 
-use crate::equilibrium::{Equilibrium, Status, Units, Wrench, is_settled, of_solution, solve_from};
+use crate::equilibrium::{Equilibrium, Status, Units, Wrench, is_settled, of_solution, solve_near};
 use crate::lie::{Pose, exp};
 use crate::path::with_pose;
 use crate::program::{BeltPoint, BeltProgram, Piece};
@@ -150,7 +150,7 @@ impl Tracker {
             };
         }
         let scenario = self.scenario_at(&goal);
-        let found = solve_from(&scenario, self.follower.point(), proceed);
+        let found = solve_near(&scenario, self.follower.point(), proceed);
         self.take(&found, followed)
     }
 

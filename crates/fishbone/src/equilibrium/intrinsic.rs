@@ -152,6 +152,7 @@ fn find(
     let solution = match from {
         Start::Near(shape) => search.from(&program, shape.clone(), proceed),
         Start::Shape(shape) => search.only_from(&program, shape.clone(), proceed),
+        Start::Close(shape) => search.only_near(&program, shape.clone(), proceed),
         Start::Guess => {
             let finer = scenario.elements() > scenario.default_elements();
             let coarse = finer.then(|| assembly.program(scenario.default_elements()));

@@ -4,7 +4,7 @@ use crate::energy::EnergyModel;
 use crate::guess::{buckle, disturb, guess, inside, is_flat, ring};
 use crate::program::{BeltPoint, BeltProgram, Piece};
 use crate::scenario::SAME_PLACE;
-use crate::solver::{self, Outcome, Settings, Solution};
+use crate::solver::{self, Bounds, Outcome, Settings, Solution};
 use nalgebra::{Vector2, Vector3};
 use std::f64::consts::PI;
 use std::ops::ControlFlow;
@@ -13,6 +13,8 @@ use std::ops::ControlFlow;
 const COLD: f64 = 10.0;
 /// First barrier from the solution of a problem nearby.
 const WARM: f64 = 0.1;
+/// First barrier from the same minimum on another mesh.
+const CLOSE: f64 = 1e-3;
 const ITERATIONS: usize = 500;
 /// By how much the start is disturbed where the plain one leads to no minimum.
 const DISTURBANCES: [f64; 3] = [0.05, 0.2, 0.4];
@@ -102,6 +104,16 @@ impl Search {
         proceed: &mut Proceed,
     ) -> Solution<BeltPoint> {
         self.minimise(program, inside(program, point), COLD, proceed)
+    }
+
+    /// Searches from a shape of the same mesh next to a minimum, and from nowhere else.
+    pub(super) fn only_near(
+        &self,
+        program: &BeltProgram,
+        point: BeltPoint,
+        proceed: &mut Proceed,
+    ) -> Solution<BeltPoint> {
+        self.minimise(program, inside(program, point), CLOSE, proceed)
     }
 
     /// Searches from the guess, then from other starts, until a minimum is found; the best that was found otherwise.
@@ -238,7 +250,7 @@ fn rank(solution: &Solution<BeltPoint>) -> u8 {
 }
 
 /// The same shape on another mesh.
-fn prolong(from: &BeltProgram, point: &BeltPoint, to: &BeltProgram) -> BeltPoint {
+pub(super) fn prolong(from: &BeltProgram, point: &BeltPoint, to: &BeltProgram) -> BeltPoint {
     let (nodes, known) = (to.nodes(), from.nodes());
     let after_joint = |k: usize| k > 0 && matches!(to.pieces[k - 1], Piece::Joint { .. });
     let places = nodes.iter().enumerate();
@@ -250,6 +262,24 @@ fn prolong(from: &BeltProgram, point: &BeltPoint, to: &BeltProgram) -> BeltPoint
         fields,
     };
     inside(to, prolonged)
+}
+
+/// The bounds' multipliers on another mesh: those of a stage shared out by length.
+pub(super) fn prolong_bounds(from: &BeltProgram, bounds: &Bounds, to: &BeltProgram) -> Bounds {
+    let (nodes, known) = (to.nodes(), from.nodes());
+    let stage = |(k, piece): (usize, &Piece)| {
+        let middle = 0.5 * (nodes[k] + nodes[k + 1]);
+        let parent = known.partition_point(|node| *node <= middle);
+        let parent = parent.clamp(1, from.pieces.len()) - 1;
+        let whole = from.pieces[parent].length();
+        let share = if whole > 0.0 {
+            piece.length() / whole
+        } else {
+            1.0
+        };
+        bounds[parent].map(|multiplier| share * multiplier)
+    };
+    to.pieces.iter().enumerate().map(stage).collect()
 }
 
 /// The fields at an arc length in U, before or after the jump where there is one.

@@ -10,7 +10,7 @@ use super::chain::NodeVector;
 use super::kkt::KktVector;
 use super::modes::lowest_modes_of;
 use super::push::pushed_over;
-use super::{BOUNDS, Kkt, Program, Residuals, Settings, Stationary, Values, minimise};
+use super::{BOUNDS, Kkt, Program, Residuals, Settings, Stationary, Values, assess, minimise};
 use super::{Mode, Solution};
 use std::ops::ControlFlow;
 
@@ -522,6 +522,34 @@ impl<'a, F: Family> Continuation<'a, F> {
         let parameter = (first.parameter - last.parameter).abs();
         stations.len() > SOME_WAY && parameter <= SAME && objective <= SAME * first.objective.abs()
     }
+}
+
+/// A single programme is a family too.
+struct Alone<'a, P>(&'a P);
+
+impl<'a, P: Program> Family for Alone<'a, P> {
+    type Program = &'a P;
+
+    fn at(&self, _: f64) -> Option<&'a P> {
+        Some(self.0)
+    }
+}
+
+/// The stationary point, minimum or not, that Newton's method finds next to a point.
+pub fn settle<P: Program>(
+    program: &P,
+    tolerance: f64,
+    mut near: Stationary<P::Point>,
+) -> Option<Solution<P::Point>> {
+    let pace = Pace {
+        longest: 1.0,
+        stations: 1,
+        events: false,
+    };
+    let family = Alone(program);
+    let continuation = Continuation::new(&family, tolerance, [0.0, 1.0], pace);
+    continuation.correct(&mut near, 0.0, None)?;
+    Some(assess(program, tolerance, &near))
 }
 
 /// A step of a continuation.

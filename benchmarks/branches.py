@@ -1,0 +1,116 @@
+"""Whether `fishbone.branches` finds every energy level that searches from random shapes find, and none but true ones.
+
+    python benchmarks/branches.py [--count 50] [--guesses 200] [--seed 1]
+
+The scenarios are those of random_poses.py. A random shape has a bend and a rib slope that are sums of five cosines with
+random amplitudes and phases, up to the bend of a ring and slopes of a half, root mean square; it does not meet its
+supports. Every shape that `branches` finds is solved for again on a mesh twice as fine.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+import fishbone as fb
+import random_poses
+import tables
+
+if TYPE_CHECKING:
+    from fishbone import Equilibrium, Scenario
+
+Floats = NDArray[np.float64]
+POINTS = 161
+SAME_LEVEL = 1e-4
+"""Energies that differ by less than this share are one level."""
+MESH, NEAR = 2e-2, 3e-2
+"""What a mesh twice as fine may change of an energy, as a share, and of a shape, in U."""
+
+
+def smooth_field(rng: np.random.Generator, size: float) -> Floats:
+    """A sum of five cosines with random amplitudes and phases, of this size, root mean square."""
+    u = np.linspace(0.0, 1.0, POINTS)
+    waves = (rng.normal() * np.cos(k * np.pi * u + rng.uniform(0.0, 2.0 * np.pi)) for k in range(5))
+    field = np.sum(list(waves), axis=0)
+    scaled: Floats = size * field / np.sqrt(np.mean(field**2))
+    return scaled
+
+
+def random_shape(rng: np.random.Generator) -> tuple[Floats, Floats]:
+    """Bend, up to that of a ring, and rib slope, up to a half."""
+    return smooth_field(rng, rng.uniform(0.0, 2.0 * np.pi)), smooth_field(rng, rng.uniform(0.0, 0.5))
+
+
+def fine_energy(coarse: Equilibrium) -> float | None:
+    """Energy of the same equilibrium on a mesh twice as fine; None where that has none like it."""
+    fine = coarse.refined(2 * (len(coarse.u) - 1))
+    if fine is None or abs(fine.energy - coarse.energy) > MESH * abs(coarse.energy):
+        return None
+    apart = np.linalg.norm(fine.position[::2] - coarse.position, axis=1)
+    return None if np.max(apart) > NEAR else fine.energy
+
+
+def random_levels(scenario: Scenario, rng: np.random.Generator, guesses: int) -> list[Equilibrium]:
+    """Minima that searches from random shapes find, one of each level."""
+    found = [fb.solve(scenario, start=random_shape(rng)) for _ in range(guesses)]
+    distinct: list[Equilibrium] = []
+    for minimum in sorted((e for e in found if e.status == "converged" and e.stable), key=lambda e: e.energy):
+        if not distinct or not is_level(minimum.energy, distinct[-1].energy):
+            distinct.append(minimum)
+    return distinct
+
+
+def is_level(energy: float, other: float) -> bool:
+    """Whether two energies are one level."""
+    return abs(energy - other) <= SAME_LEVEL * abs(energy)
+
+
+def main() -> None:
+    """Runs it and prints a line for each scenario, then the table."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--count", type=int, default=50)
+    parser.add_argument("--guesses", type=int, default=200)
+    parser.add_argument("--seed", type=int, default=1)
+    options = parser.parse_args()
+    rng = np.random.default_rng(options.seed)
+    total = {"levels": 0, "of the mesh": 0, "missed": 0, "branches": 0, "unconfirmed": 0}
+    for index in range(options.count):
+        scenario = random_poses.scenario(random_poses.ENERGIES[index % 3], *random_poses.pose(rng))
+        began = time.perf_counter()
+        branches = fb.branches(scenario)
+        took = time.perf_counter() - began
+        by_chance = random_levels(scenario, rng, options.guesses)
+        fine_of = {id(e): fine_energy(e) for e in (*branches, *by_chance)}
+        known = [energy for b in branches if (energy := fine_of[id(b)]) is not None]
+        true = [e for e in by_chance if fine_of[id(e)] is not None]
+        lost = [e.energy for e in true if not any(is_level(fine_of[id(e)] or 0.0, energy) for energy in known)]
+        doubtful = [b.energy for b in branches if fine_of[id(b)] is None]
+        total["levels"] += len(true)
+        total["of the mesh"] += len(by_chance) - len(true)
+        total["missed"] += len(lost)
+        total["branches"] += len(branches)
+        total["unconfirmed"] += len(doubtful)
+        print(
+            f"{index:3d} {scenario.to_dict()['energy']:10s} {took:5.1f} s, {len(branches)} branches, negative modes "
+            f"{[b.negative_modes for b in branches]}; random levels {len(true)} of {len(by_chance)}, "
+            f"missed {np.round(lost, 3)}, unconfirmed {np.round(doubtful, 3)}",
+            flush=True,
+        )
+    rows = [
+        ["scenarios", str(options.count)],
+        ["random searches of each", str(options.guesses)],
+        ["levels that they find", str(total["levels"])],
+        ["others that they find, which a mesh twice as fine does not have", str(total["of the mesh"])],
+        ["levels that `branches` misses", str(total["missed"])],
+        ["what `branches` finds", str(total["branches"])],
+        ["of these not confirmed by a mesh twice as fine", str(total["unconfirmed"])],
+    ]
+    print(tables.table(["", ""], rows))
+
+
+if __name__ == "__main__":
+    main()

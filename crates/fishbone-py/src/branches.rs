@@ -1,0 +1,81 @@
+//! `_core.branches`.
+
+use crate::equilibrium::{Equilibrium, SIGNAL_INTERVAL};
+use crate::scenario::Scenario;
+use fishbone::branches::{self as core, Watch};
+use pyo3::prelude::*;
+use rayon::prelude::*;
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::thread;
+
+/// How far the search is, and whether it is to end.
+#[derive(Default)]
+struct Counter {
+    done: AtomicUsize,
+    planned: AtomicUsize,
+    stop: AtomicBool,
+}
+
+impl Watch for Counter {
+    fn proceed(&self) -> ControlFlow<()> {
+        match self.stop.load(Ordering::Relaxed) {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        }
+    }
+
+    fn tell(&self, done: usize, planned: usize) {
+        self.done.fetch_max(done, Ordering::Relaxed);
+        self.planned.fetch_max(planned, Ordering::Relaxed);
+    }
+}
+
+/// Finds the equilibria of a scenario over all cores with the GIL released; `progress(done, planned)` is called now and then
+/// from the calling thread.
+///
+/// Errors: whatever `progress` or a signal handler raises; the search then ends.
+#[pyfunction]
+#[pyo3(signature = (scenario, progress=None))]
+pub(crate) fn branches(
+    py: Python<'_>,
+    scenario: &Scenario,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Vec<Equilibrium>> {
+    let counter = Counter::default();
+    py.detach(|| {
+        thread::scope(|scope| {
+            let search = scope.spawn(|| {
+                let run = |count: usize, task: &(dyn Fn(usize) + Sync)| {
+                    (0..count).into_par_iter().for_each(task);
+                };
+                core::branches(&scenario.0, &run, &counter)
+            });
+            let mut waited = Ok(());
+            while waited.is_ok() && !search.is_finished() {
+                thread::park_timeout(SIGNAL_INTERVAL);
+                waited = tell(&counter, progress.as_ref());
+            }
+            counter.stop.store(waited.is_err(), Ordering::Relaxed);
+            let found = search.join();
+            waited.map(|()| {
+                let found = found.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+                found
+                    .into_iter()
+                    .map(|found| Equilibrium::of(|| found))
+                    .collect()
+            })
+        })
+    })
+}
+
+fn tell(counter: &Counter, progress: Option<&Py<PyAny>>) -> PyResult<()> {
+    let [done, planned] = [&counter.done, &counter.planned].map(|n| n.load(Ordering::Relaxed));
+    Python::attach(|py| {
+        py.check_signals()?;
+        match progress {
+            Some(progress) => progress.call1(py, (done, planned)).map(drop),
+            None => Ok(()),
+        }
+    })
+}
