@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 
 from fishbone import _core
-from fishbone.errors import InvalidArgument, InvalidScenario, NoModes, NoSensitivity, NoSupport, NotConverged
+from fishbone.errors import InvalidArgument, InvalidScenario, NoMargin, NoModes, NoSensitivity, NoSupport, NotConverged
 from fishbone.sensitivity import Sensitivity
 
 if TYPE_CHECKING:
@@ -27,6 +27,9 @@ MIN_ACROSS, MAX_ACROSS = 2, 10_001
 
 MAX_MODES = 100
 """More than what a mesh resolves."""
+
+MAX_REACH = 10.0
+"""Farther than any support of a belt of length 1 needs to go."""
 
 Status = Literal["converged", "infeasible", "not_converged"]
 
@@ -101,6 +104,21 @@ class Mode(NamedTuple):
     """Change of the bend ω_ζ, shape (n,)."""
     rib_slope: Floats
     """Change of the rib slope β, shape (n,)."""
+
+
+class SnapMargin(NamedTuple):
+    """Where a support may not be moved without the belt's losing its stability."""
+
+    distance: float
+    """How far it is: the norm of displacement in U and rotation in rad."""
+    direction: Floats
+    """Where to: displacement in U and rotation left in world axes, of norm 1, shape (6,)."""
+    snaps: bool
+    """Whether the equilibrium ends there, in a fold; else it goes on, no longer stable, where others branch off."""
+    position: Floats
+    """Position of the support there, shape (3,)."""
+    rotation: Floats
+    """Rotation vector of the support there, shape (3,)."""
 
 
 class HighestPoint(NamedTuple):
@@ -383,6 +401,37 @@ class Equilibrium:
         _, force, moment = self._inner.reactions[self._support_index(support)]
         return Reaction(np.array(force), np.array(moment))
 
+    def snap_margin(
+        self,
+        support: Literal["start", "end"] | float = "end",
+        direction: npt.ArrayLike | None = None,
+        *,
+        reach: float = 1.0,
+    ) -> SnapMargin | None:
+        """How far a support may move before the belt is stable no longer; None where that is not within `reach`.
+
+        Along `direction`, [displacement in U, rotation left in world axes], of which the length does not matter; or
+        without one to wherever it is nearest, as far as can be told: from the nearest place along the six axes, either
+        way, on along the normal of the boundary of stability. A belt that is drawn taut before has lost nothing.
+        Stability that is lost and won again within a step of a twentieth of the reach may go unnoticed. The support is
+        named as for `reaction`, and must hold a position and a rotation.
+
+        Shapes: direction (6,).
+        Errors: `NoSupport`; `NoMargin` unless the equilibrium is stable; `InvalidArgument` for what is no direction or
+        reach.
+        """
+        if not 0.0 < reach <= MAX_REACH:
+            raise InvalidArgument(f"reach: found {reach}, allowed above 0 and up to {MAX_REACH}")
+        along = None if direction is None else _direction(direction)
+        try:
+            margin = self._inner.margin(self._support_index(support), along, reach)
+        except ValueError as error:
+            raise NoMargin(str(error)) from None
+        if margin is None:
+            return None
+        distance, towards, is_fold, position, rotation = margin
+        return SnapMargin(distance, np.array(towards), is_fold, np.array(position), np.array(rotation))
+
     def sensitivity(self) -> Sensitivity:
         """The derivatives of everything by what the scenario says, as one factorised system: made once, used often.
 
@@ -569,6 +618,14 @@ def _across(n_across: int) -> int:
     if not MIN_ACROSS <= n_across <= MAX_ACROSS:
         raise InvalidArgument(f"n_across: found {n_across}, allowed {MIN_ACROSS} to {MAX_ACROSS}")
     return n_across
+
+
+def _direction(direction: npt.ArrayLike) -> list[float]:
+    vector = np.asarray(direction, dtype=np.float64)
+    if vector.shape != (6,) or not np.isfinite(vector).all() or not vector.any():
+        raise InvalidArgument(f"direction: found {direction!r}, allowed six finite numbers, not all 0")
+    numbers: list[float] = vector.tolist()
+    return numbers
 
 
 def _flat_points(flat: npt.ArrayLike) -> list[list[float]]:

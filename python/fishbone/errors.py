@@ -28,6 +28,10 @@ class NoSensitivity(FishboneError):  # noqa: N818
     """A shape has no derivatives: it is no equilibrium, no minimum, or not determined by its supports."""
 
 
+class NoMargin(FishboneError):  # noqa: N818
+    """A shape has no stability to lose, or nothing that could be moved."""
+
+
 class NoModes(FishboneError):  # noqa: N818
     """A shape has no modes of its own: it is no equilibrium."""
 

@@ -7,7 +7,7 @@ use crate::tracker::Tracker;
 use fishbone::equilibrium::{self, Status, Wrench};
 use fishbone::spine::Piece;
 use fishbone::surface::{self, Curve, Rib};
-use nalgebra::{Vector2, Vector3};
+use nalgebra::{Vector2, Vector3, Vector6};
 use numpy::IntoPyArray;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -129,6 +129,9 @@ impl Signals {
         }
     }
 }
+
+/// Distance, direction, whether it is a fold, position and rotation vector.
+type Margin = (f64, [f64; 6], bool, [f64; 3], [f64; 3]);
 
 /// Eigenvalue, translation, rotation, bend and rib slope.
 type Mode<'py> = (f64, Points<'py>, Points<'py>, Scalars<'py>, Scalars<'py>);
@@ -458,6 +461,45 @@ impl Equilibrium {
                 (scenario, Self { solved, solve_time })
             })),
         }
+    }
+
+    /// (distance, direction, whether it is a fold, position, rotation vector) of the nearest loss of stability, along a
+    /// direction or wherever it is; None where there is none within reach.
+    ///
+    /// Errors: `ValueError`, one line, where there is no stability to lose; whatever a signal handler raises.
+    #[pyo3(signature = (support, direction, reach))]
+    fn margin(
+        &self,
+        py: Python<'_>,
+        support: usize,
+        direction: Option<[f64; 6]>,
+        reach: f64,
+    ) -> PyResult<Option<Margin>> {
+        let mut signals = Signals::new();
+        let margin = py.detach(|| {
+            let proceed = &mut || signals.proceed();
+            match direction {
+                Some(direction) => {
+                    let direction = Vector6::from(direction);
+                    self.solved
+                        .margin_along(support, &direction, reach, proceed)
+                }
+                None => self.solved.margin(support, reach, proceed),
+            }
+        });
+        if let Some(error) = signals.raised {
+            return Err(error);
+        }
+        let margin = margin.map_err(|error| PyValueError::new_err(error.to_string()))?;
+        Ok(margin.map(|margin| {
+            (
+                margin.distance,
+                margin.direction.into(),
+                margin.is_fold,
+                array::row(&margin.position),
+                array::row(&margin.rotation),
+            )
+        }))
     }
 
     /// (eigenvalue, translation, rotation, bend, rib slope) of the lowest modes, found with the GIL released.

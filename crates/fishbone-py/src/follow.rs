@@ -139,6 +139,7 @@ impl Diagram {
     fn end(&self, branch: usize) -> &'static str {
         match self.0.branches[branch].end {
             End::Range => "range",
+            End::Event => "event",
             End::Closed => "closed",
             End::Budget => "budget",
             End::Lost => "lost",

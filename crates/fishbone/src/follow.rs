@@ -5,7 +5,7 @@ use crate::path::Path;
 use crate::program::{BeltPoint, BeltProgram};
 use crate::scenario::Scenario;
 use crate::solver::{
-    self, Continuation, Curve, Family, Pace, Residuals, Shape, Station, Stationary, Turn,
+    self, Continuation, Curve, Events, Family, Pace, Residuals, Shape, Station, Stationary, Turn,
 };
 use crate::stability::Stability;
 use crate::surface;
@@ -171,10 +171,10 @@ pub struct Snapped {
 }
 
 /// The programmes of the scenarios along a path, all on the same mesh.
-struct Along<'a> {
-    path: &'a Path,
-    elements: usize,
-    nodes: usize,
+pub(crate) struct Along<'a> {
+    pub(crate) path: &'a Path,
+    pub(crate) elements: usize,
+    pub(crate) nodes: usize,
 }
 
 impl Family for Along<'_> {
@@ -212,7 +212,7 @@ pub fn follow(
     let pace = Pace {
         longest: settings.step,
         stations: settings.states,
-        events: true,
+        events: Events::Find,
     };
     let tolerance = path.base().solver.tolerance;
     let continuation = Continuation::new(&family, tolerance, [0.0, path.length()], pace);

@@ -37,6 +37,7 @@ pub mod follow;
 mod guess;
 pub mod lie;
 pub mod linking;
+pub mod margin;
 pub mod material;
 pub mod path;
 pub mod program;

@@ -10,7 +10,9 @@ use super::chain::NodeVector;
 use super::kkt::KktVector;
 use super::modes::lowest_modes_of;
 use super::push::pushed_over;
-use super::{BOUNDS, Kkt, Program, Residuals, Settings, Stationary, Values, assess, minimise};
+use super::{
+    BOUNDS, Kkt, Program, Residuals, Rows, Settings, Stationary, Values, assess, minimise,
+};
 use super::{Mode, Solution};
 use std::ops::ControlFlow;
 
@@ -78,6 +80,8 @@ pub struct Event<X> {
 pub enum End {
     /// The parameter has left its range.
     Range,
+    /// At its first event, as asked.
+    Event,
     /// The curve has come back to where it began.
     Closed,
     /// All stations that were allowed are used up.
@@ -106,8 +110,19 @@ pub struct Pace {
     pub longest: f64,
     /// Most stations of a curve.
     pub stations: usize,
-    /// Whether to look for events.
-    pub events: bool,
+    /// What to do about events.
+    pub events: Events,
+}
+
+/// What to do where the inertia changes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Events {
+    /// Go on without looking.
+    Ignore,
+    /// Find the place.
+    Find,
+    /// Find the first place, and end there.
+    EndAtFirst,
 }
 
 /// Follows the stationary points of a family.
@@ -176,6 +191,10 @@ impl<'a, F: Family> Continuation<'a, F> {
             if let Some(event) = step.event {
                 curve.stations.push(event.station.clone());
                 curve.events.push((curve.stations.len() - 1, event));
+                if self.pace.events == Events::EndAtFirst {
+                    curve.end = End::Event;
+                    break;
+                }
             }
             curve.stations.push(step.station);
             if step.arrived {
@@ -217,6 +236,24 @@ impl<'a, F: Family> Continuation<'a, F> {
         Some([found(true), found(false)])
     }
 
+    /// How the constraints' multipliers change along the mode of an event.
+    pub fn multipliers_along(&self, event: &Event<PointOf<F>>) -> Option<Vec<Rows>> {
+        let program = self.family.at(event.station.parameter)?;
+        let mut kkt = Kkt::factorise_any(&program, &mut event.station.at.clone()).ok()?;
+        let mut push = kkt.zero();
+        push.nodes = event.mode.pull.iter().map(|pull| -pull).collect();
+        // Next to the event hardly anything resists along the mode: the answer is a large multiple of it.
+        let answer = kkt.solve_nearly(&push).ok()?;
+        let multiple = dot(&event.mode.pull, &answer.nodes);
+        Some(
+            answer
+                .constraints
+                .iter()
+                .map(|rows| rows / multiple)
+                .collect(),
+        )
+    }
+
     /// The minimum downhill from a station, at another value of the parameter; where it is a saddle, off along a mode.
     pub fn descend(
         &self,
@@ -253,7 +290,7 @@ impl<'a, F: Family> Continuation<'a, F> {
             let shortest = *length < 2.0 * SHORTEST;
             let taken = step.filter(|next| {
                 let straight = last.cosine(next) > SHARPEST;
-                let apart = !self.pace.events || last.turns_before(next).is_some();
+                let apart = self.pace.events == Events::Ignore || last.turns_before(next).is_some();
                 shortest || (straight && apart)
             });
             let Some(next) = taken else {
@@ -264,8 +301,8 @@ impl<'a, F: Family> Continuation<'a, F> {
                 continue;
             };
             let event = match self.pace.events {
-                true => self.event_between(last, &next, *length),
-                false => None,
+                Events::Ignore => None,
+                Events::Find | Events::EndAtFirst => self.event_between(last, &next, *length),
             };
             let [low, high] = self.range;
             if next.parameter < low || next.parameter > high {
@@ -544,7 +581,7 @@ pub fn settle<P: Program>(
     let pace = Pace {
         longest: 1.0,
         stations: 1,
-        events: false,
+        events: Events::Ignore,
     };
     let family = Alone(program);
     let continuation = Continuation::new(&family, tolerance, [0.0, 1.0], pace);

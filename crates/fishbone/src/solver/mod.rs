@@ -18,7 +18,9 @@ mod newton;
 mod push;
 mod rank;
 
-pub use continuation::{Continuation, Curve, End, Event, Family, Pace, Station, Turn, settle};
+pub use continuation::{
+    Continuation, Curve, End, Event, Events, Family, Pace, Station, Turn, settle,
+};
 pub use follow::{Followed, Follower, Shape};
 pub use inertia::Inertia;
 pub use interior_point::{assess, minimise};

@@ -1,7 +1,7 @@
 //! From one stationary point to another of the same programme: by a push along a mode, followed until it takes none.
 
 use super::chain::NodeVector;
-use super::continuation::{Continuation, End, Family, Pace};
+use super::continuation::{Continuation, End, Events, Family, Pace};
 use super::{Bounds, Kkt, Linearisation, Mode, Program, Rows, RowsByNode, Stationary, Values};
 use nalgebra::Matrix6;
 use std::ops::ControlFlow;
@@ -31,7 +31,7 @@ pub fn pushed_over<P: Program + Clone>(
     const PACE: Pace = Pace {
         longest: 0.05,
         stations: 80,
-        events: false,
+        events: Events::Ignore,
     };
     /// A push of strength 1 is the force of a stiff mode displaced by a length.
     const STIFF: f64 = 300.0;
