@@ -712,8 +712,9 @@ impl BeltProgram {
 mod tests {
     use super::*;
     use crate::energy::Curl;
+    use crate::solver::{Stationary, lowest_modes};
     use crate::strip::Edge;
-    use nalgebra::Rotation3;
+    use nalgebra::{DMatrix, DVector, Rotation3, SymmetricEigen};
 
     fn element(length: f64, geodesic: f64) -> Piece {
         Piece::Strip(Element {
@@ -901,6 +902,106 @@ mod tests {
                 assert!(
                     (second - exact).abs() < 2e-5 * exact.abs().max(10.0),
                     "{a:?} {b:?} {second} {exact}"
+                );
+            }
+        }
+    }
+
+    /// The lowest modes by dense matrices: of the second derivative on the null space of the constraints.
+    fn dense_modes(program: &BeltProgram, at: &Stationary<BeltPoint>) -> Vec<f64> {
+        let mut point = at.point.clone();
+        let mut values = Values::default();
+        assert!(program.evaluate(&mut point, &mut values));
+        let mut linear = Linearisation::new(program);
+        program.linearise(&point, &at.multipliers, &at.bound_multipliers, &mut linear);
+        let unknowns = unknowns(program);
+        let steps: Vec<Vec<NodeVector>> = unknowns
+            .iter()
+            .map(|(node, entry)| {
+                let mut step = vec![NodeVector::zeros(); program.pieces.len() + 1];
+                step[*node][*entry] = 1.0;
+                linear.chain.carry(&mut step);
+                step
+            })
+            .collect();
+        let count = unknowns.len();
+        let square =
+            |product: &dyn Fn(usize, usize) -> f64| DMatrix::from_fn(count, count, product);
+        let rate = |k: usize, b: usize, step: &[NodeVector]| {
+            let by = &linear.slacks[k][b];
+            let [first, second] = [k, k + 1].map(|node| &step[node]);
+            by[0] * first[6] + by[1] * first[7] + by[2] * second[6] + by[3] * second[7]
+        };
+        let second = square(&|i, j| {
+            let own = linear
+                .chain
+                .second_derivative(&linear.diagonal, unknowns[i], unknowns[j]);
+            let bounds = (0..program.pieces.len()).flat_map(|k| (0..BOUNDS).map(move |b| (k, b)));
+            let held = bounds.map(|(k, b)| {
+                let stiffness = at.bound_multipliers[k][b] / values.slacks[k][b];
+                stiffness * rate(k, b, &steps[i]) * rate(k, b, &steps[j])
+            });
+            own + held.sum::<f64>()
+        });
+        let metric = program.metric(&point);
+        let state = |step: &[NodeVector], k: usize| step[k].fixed_rows::<6>(0).into_owned();
+        let mass = square(&|i, j| {
+            let of_node = |k: usize| state(&steps[i], k).dot(&(metric[k] * state(&steps[j], k)));
+            (0..metric.len()).map(of_node).sum()
+        });
+        let rows_of = |step: &Vec<NodeVector>| {
+            let at_nodes = program.supports.iter().zip(&linear.constraints);
+            let at_nodes = at_nodes.map(|(support, rows)| rows * step[support.node]);
+            let links = program.links.iter().zip(&linear.links);
+            let between = links
+                .map(|(link, rows)| rows[0] * step[link.nodes[0]] + rows[1] * step[link.nodes[1]]);
+            at_nodes
+                .chain(between)
+                .flat_map(|rows| Vec::from(rows.as_slice()))
+                .collect::<Vec<f64>>()
+        };
+        let columns: Vec<_> = steps
+            .iter()
+            .map(|step| DVector::from_vec(rows_of(step)))
+            .collect();
+        let jacobian = DMatrix::from_columns(&columns);
+        let eigen = SymmetricEigen::new(jacobian.tr_mul(&jacobian));
+        let largest = eigen.eigenvalues.amax();
+        let free: Vec<_> = (0..count)
+            .filter(|i| eigen.eigenvalues[*i] < 1e-12 * largest)
+            .map(|i| eigen.eigenvectors.column(i).into_owned())
+            .collect();
+        let basis = DMatrix::from_columns(&free);
+        let reduced = |matrix: &DMatrix<f64>| basis.tr_mul(&(matrix * &basis));
+        let root = reduced(&mass).cholesky().unwrap().l();
+        let half = root.solve_lower_triangular(&reduced(&second)).unwrap();
+        let whole = root.solve_lower_triangular(&half.transpose()).unwrap();
+        let mut values: Vec<f64> = whole.symmetric_eigenvalues().iter().copied().collect();
+        values.sort_by(f64::total_cmp);
+        values
+    }
+
+    #[test]
+    fn test_lowest_modes_are_those_of_dense_matrices() {
+        let program = program();
+        let multiplier = |k: usize, i: usize| 0.7 + 0.6 * k as f64 - 0.4 * i as f64;
+        for strength in [0.1, 3.0, 30.0] {
+            let mut at = Stationary {
+                point: point(&program),
+                multipliers: (0..5)
+                    .map(|k| Rows::from_fn(|i, _| strength * multiplier(k, i)))
+                    .collect(),
+                bound_multipliers: vec![[1e-3; BOUNDS]; 9],
+            };
+            let expected = dense_modes(&program, &at);
+            let modes = lowest_modes(&program, &mut at, 4).unwrap();
+            assert_eq!(modes.len(), 4);
+            for (mode, expected) in modes.iter().zip(&expected) {
+                let difference = (mode.eigenvalue - expected).abs();
+                assert!(
+                    difference < 1e-6 * expected.abs().max(1.0),
+                    "{} {expected}",
+                    mode.eigenvalue
                 );
             }
         }

@@ -1,0 +1,200 @@
+"""Stability counted, modes, and how far it is to the loss of stability.
+
+Expected values are closed forms of the vibrating and the buckled beam, or come from `planar`, which knows nothing of
+the package. The scale of modes is the mean squared displacement of the board, all of it weighing alike: with one unit
+of mass in all, eigenvalues are squared natural frequencies.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import fishbone as fb
+from helpers import Json, belt, clamped, example1, solve, support
+
+CLAMPED_CLAMPED = (4.730040744862704, 7.853204624095838, 10.995607838001671)
+"""Roots of cos k cosh k = 1."""
+CLAMPED_FREE = (1.875104068711961, 4.694091132974175, 7.854757438237613)
+"""Roots of cos k cosh k = −1."""
+
+
+def strut(force: float, width: float = 0.1) -> Json:
+    """A straight belt clamped at its start, its end square and free to slide along y under a dead force along y."""
+    scenario = belt([support("start", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))], width=width)
+    end = {"at": "end", "position": [0.0, "free", 0.0], "rotation": [0.0, 0.0, 0.0]}
+    scenario["supports"].append(end)
+    scenario["loads"] = {"points": [{"at": "end", "force": [0.0, force, 0.0]}]}
+    return scenario
+
+
+def flat(scenario: Json) -> fb.Equilibrium:
+    """The flat state, stable or not."""
+    zeros = np.zeros(9)
+    return fb.solve(fb.Scenario.from_dict(scenario), start=(zeros, zeros))
+
+
+# ------------------------------------------------------------------------------------------------------- the modes
+
+
+def test_modes_of_a_straight_belt_are_those_of_a_clamped_beam() -> None:
+    """Without stress ω² = k⁴ R_f/(ρ U⁴); the rotary inertia of the board about its spine takes no part in bending."""
+    scenario = belt([support("start", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))])
+    modes = flat(scenario).modes(3)
+    expected = [k**4 for k in CLAMPED_FREE]
+    assert [mode.eigenvalue for mode in modes] == pytest.approx(expected, rel=1e-3)
+    ends = clamped((0.0, 1.0, 0.0))
+    ends["supports"][1]["position"] = [0.0, "free", 0.0]
+    modes = flat(ends).modes(3)
+    assert [mode.eigenvalue for mode in modes] == pytest.approx([k**4 for k in CLAMPED_CLAMPED], rel=1e-3)
+
+
+@pytest.mark.parametrize("length", [1.0, 2.5])
+def test_mode_scales_with_the_belt(length: float) -> None:
+    """Energy per squared length: R_f/U³ for a mean squared displacement of 1."""
+    scenario = belt(
+        [support("start", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))], length=length, width=0.1 * length, rigidity=3.0
+    )
+    (mode,) = flat(scenario).modes(1)
+    assert mode.eigenvalue == pytest.approx(3.0 * CLAMPED_FREE[0] ** 4 / length**3, rel=1e-3)
+    mean_square = np.trapezoid(np.sum(mode.translation**2, axis=1), np.linspace(0.0, 1.0, len(mode.translation)))
+    assert mean_square == pytest.approx(1.0, rel=1e-2)
+
+
+def second_difference(scenario: fb.Scenario, equilibrium: fb.Equilibrium, mode: fb.Mode) -> float:
+    """Second derivative of the energy along a mode: how much a dead force that holds it there has to pull.
+
+    The belt is pulled by dead forces along the mode's own displacement, the same per length all along: to first order
+    it moves by the force over the eigenvalue along the mode, and along no other.
+    """
+    nodes = np.arange(2, len(equilibrium.u) - 2)
+    pull = 1e-4
+    lengths = np.gradient(equilibrium.u)
+    tables = scenario.to_dict()
+    tables["loads"] = {
+        "points": [
+            {"at": float(equilibrium.u[k]), "force": (pull * lengths[k] * mode.translation[k]).tolist()} for k in nodes
+        ]
+    }
+    moved = fb.solve(fb.Scenario.from_dict(tables)).position - equilibrium.position
+    along = np.sum(lengths[:, None] * moved * mode.translation)
+    return pull / float(along)
+
+
+@pytest.mark.parametrize("end", [(0.0, 0.6, 0.0), (0.05, 0.55, 0.1)])
+def test_eigenvalue_is_the_stiffness_against_forces_along_the_mode(end: tuple[float, float, float]) -> None:
+    """A clamped arch under small dead forces in the shape of its lowest mode, against the solver without them."""
+    scenario = fb.Scenario.from_dict(clamped(end, width=0.02, elements=80))
+    equilibrium = fb.solve(scenario)
+    mode = equilibrium.modes(1)[0]
+    assert second_difference(scenario, equilibrium, mode) == pytest.approx(mode.eigenvalue, rel=0.02)
+
+
+def test_modes_are_square_to_each_other_and_rise() -> None:
+    equilibrium = solve(example1())
+    modes = equilibrium.modes(5)
+    values = [mode.eigenvalue for mode in modes]
+    assert values == sorted(values)
+    assert values[0] > 0.0
+    lengths = np.gradient(equilibrium.u)[:, None]
+    across = equilibrium.frame[:, :, 2]
+    moves = [(mode.translation, np.cross(mode.rotation, across)) for mode in modes]
+    products = [[np.sum(lengths * (a[0] * b[0] + 0.1**2 / 12.0 * a[1] * b[1])) for b in moves] for a in moves]
+    assert np.array(products) == pytest.approx(np.eye(5), abs=1e-9)
+
+
+@pytest.mark.parametrize("count", [0, 101])
+def test_number_of_modes_is_checked(count: int) -> None:
+    with pytest.raises(fb.InvalidArgument, match="count: found"):
+        solve(example1()).modes(count)
+
+
+def test_the_sources_method_has_no_modes() -> None:
+    scenario = example1()
+    scenario.setdefault("solver", {})["method"] = "ritz"
+    equilibrium = fb.solve(fb.Scenario.from_dict(scenario))
+    assert (equilibrium.stable, equilibrium.negative_modes, equilibrium.zero_modes) == (None, None, None)
+    with pytest.raises(fb.NoModes, match="multipliers"):
+        equilibrium.modes(1)
+
+
+# ------------------------------------------------------------------------------------------------------ the counts
+
+
+@pytest.mark.parametrize(("force", "negative"), [(-45.0, 1), (-75.0, 1), (-90.0, 2), (-170.0, 3)])
+def test_flat_strut_has_as_many_negative_modes_as_loads_are_passed(force: float, negative: int) -> None:
+    """Euler's loads, clamped and sliding: 39.478, 80.763, 157.91 R_f/U²."""
+    scenario = strut(force)
+    scenario["solver"] = {"tolerance": 1e-2}
+    equilibrium = flat(scenario)
+    assert np.abs(equilibrium.bend).max() < 1e-12
+    assert (equilibrium.stable, equilibrium.negative_modes) == (False, negative)
+
+
+@pytest.mark.parametrize("force", [-30.0, 30.0])
+def test_flat_strut_under_less_is_left_open(force: float) -> None:
+    """Where it is flat, ribs of any slope are as good as others: that none of them lets it buckle is not counted."""
+    scenario = strut(force)
+    scenario["solver"] = {"tolerance": 1e-2}
+    equilibrium = flat(scenario)
+    assert (equilibrium.stable, equilibrium.negative_modes) == (None, None)
+
+
+def test_flat_belt_that_nothing_stresses_is_stable() -> None:
+    equilibrium = flat(strut(0.0))
+    assert (equilibrium.stable, equilibrium.negative_modes, equilibrium.zero_modes) == (True, 0, 0)
+
+
+def test_belt_that_may_turn_freely_has_a_zero_mode() -> None:
+    """An arch between two balls turns about the line through them at no cost."""
+    scenario = belt([support("start", (0.0, 0.0, 0.0)), support("end", (0.0, 0.7, 0.0))])
+    equilibrium = solve(scenario)
+    assert equilibrium.status == "converged"
+    assert (equilibrium.stable, equilibrium.negative_modes, equilibrium.zero_modes) == (None, 0, 1)
+
+
+def test_cantilever_is_known_to_be_stable_up_to_its_free_end() -> None:
+    scenario = fb.load("scenarios/cantilever.toml")
+    equilibrium = fb.solve(scenario)
+    assert (equilibrium.stable, equilibrium.negative_modes, equilibrium.zero_modes) == (True, 0, 0)
+
+
+# ----------------------------------------------------------------------------------------------------- the margins
+
+
+def test_margin_to_a_fold_is_that_of_the_elastica() -> None:
+    """The planar arch whose end is turned back folds at −1.1230897421, by `planar.folds`."""
+    margin = solve(clamped((0.0, 0.6, 0.0))).snap_margin(direction=(0.0, 0.0, 0.0, 0.0, 0.0, -1.0), reach=1.5)
+    assert margin is not None
+    assert margin.snaps
+    assert margin.distance == pytest.approx(1.1230897421, abs=1e-5)
+    assert margin.rotation == pytest.approx([0.0, 0.0, -1.1230897421], abs=1e-5)
+
+
+def test_margin_to_a_pitchfork_is_that_of_the_elastica() -> None:
+    """Pushed sideways the arch merges with the S at 0.6020976231, by `planar.pitchfork`."""
+    margin = solve(clamped((0.0, 0.6, 0.0))).snap_margin(direction=(2.0, 0.0, 0.0, 0.0, 0.0, 0.0), reach=0.7)
+    assert margin is not None
+    assert not margin.snaps
+    assert margin.distance == pytest.approx(0.6020976231, abs=1e-5)
+
+
+def test_nearest_margin_is_no_farther_than_along_any_axis() -> None:
+    equilibrium = solve(clamped((0.02, 0.6, 0.01), (0.1, 0.05, -0.3)))
+    nearest = equilibrium.snap_margin()
+    assert nearest is not None
+    assert np.linalg.norm(nearest.direction) == pytest.approx(1.0)
+    for axis in range(6):
+        for sign in (1.0, -1.0):
+            along = equilibrium.snap_margin(direction=sign * np.eye(6)[axis])
+            assert along is None or nearest.distance <= along.distance * (1.0 + 1e-6)
+
+
+def test_margin_is_refused_where_there_is_none() -> None:
+    equilibrium = solve(example1())
+    with pytest.raises(fb.InvalidArgument, match="direction"):
+        equilibrium.snap_margin(direction=(0.0,) * 6)
+    with pytest.raises(fb.InvalidArgument, match="reach"):
+        equilibrium.snap_margin(reach=0.0)
+    with pytest.raises(fb.NoMargin, match="not stable"):
+        flat(strut(-90.0)).snap_margin()
