@@ -40,6 +40,14 @@ class NoTracker(FishboneError):  # noqa: N818
     """There is no equilibrium to follow, or nothing to move it by."""
 
 
+class NoPath(FishboneError, ValueError):  # noqa: N818
+    """A scenario does not lead along the path that was asked for."""
+
+
+class NoBranch(FishboneError):  # noqa: N818
+    """There is no equilibrium to follow, or it has no single continuation."""
+
+
 class MissingPackage(FishboneError, ImportError):  # noqa: N818
     """An optional package is not installed; the message says how to get it."""
 

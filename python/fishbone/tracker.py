@@ -59,7 +59,7 @@ class Tracker:
         Units: those of the scenario; rad.
         Errors: `InvalidArgument` for other shapes and for what is not finite.
         """
-        return Update(*self._inner.update(_triple("position", position), _triple("rotation", rotation)))
+        return Update(*self._inner.update(triple("position", position), triple("rotation", rotation)))
 
     @property
     def energy(self) -> float:
@@ -108,7 +108,11 @@ class Tracker:
         return self._start._support_index(support)  # noqa: SLF001 - of this package
 
 
-def _triple(name: str, values: npt.ArrayLike) -> list[float]:
+def triple(name: str, values: npt.ArrayLike) -> list[float]:
+    """Three finite numbers, as a list.
+
+    Errors: `InvalidArgument`, which names them.
+    """
     try:
         vector = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError):

@@ -1,0 +1,484 @@
+"""The equilibria along a path, stable or not: where they fold, where others branch off, and what the belt snaps to."""
+
+from __future__ import annotations
+
+import functools
+import math
+import re
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+import numpy as np
+
+from fishbone import _core
+from fishbone.equilibrium import Equilibrium, Reaction, solve
+from fishbone.errors import InvalidArgument, NoBranch, NoPath
+from fishbone.scenario import Scenario
+from fishbone.tracker import triple
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    import numpy.typing as npt
+    from numpy.typing import NDArray
+
+    from fishbone.tracker import Place
+
+    Floats = NDArray[np.float64]
+    Columns = dict[str, NDArray[Any]]
+
+SCHEMA = "fishbone.diagram/1"
+MAX_STEP = 1.0
+MIN_STATES, MAX_STATES = 2, 100_000
+MAX_BRANCHES = 1000
+
+Kind = Literal["fold", "pitchfork", "transcritical", "bifurcation"]
+End = Literal["range", "closed", "budget", "lost"]
+
+
+class Poses(NamedTuple):
+    """Poses through which a support is led from its own: a path for `follow`.
+
+    Units: those of the scenario; rad.
+    """
+
+    poses: Sequence[tuple[npt.ArrayLike, npt.ArrayLike]]
+    """Each a position and a rotation vector, world axes, shapes (3,)."""
+    support: Place = "end"
+    """Which support, named as for `Equilibrium.reaction`; it must hold a position and a rotation."""
+    motion: Literal["straight", "screw"] = "straight"
+    """From one pose to the next: the point on a straight line and the frame about a fixed axis, or both as a screw."""
+
+
+class Origin(NamedTuple):
+    """Where a branch comes from."""
+
+    branch: int
+    """Index of the other branch."""
+    event: int
+    """Index of the event there."""
+
+
+class Event(NamedTuple):
+    """A place on a branch where the number of negative modes changes."""
+
+    kind: Kind
+    """What happens there.
+
+    At a "fold" the branch turns back. At a "pitchfork" another branch crosses that is its own mirror image, or that
+    turns back there; at a "transcritical" one it crosses at an angle; at a "bifurcation" are others that could not be
+    followed.
+    """
+    parameter: float
+    """Where it is, in what the diagram's `parameter_name` says."""
+    state: int
+    """Index of the branch's state there, as near as that can be solved for."""
+    negative_modes: tuple[int, int]
+    """Before and after, in the order of the states."""
+    snapped: Equilibrium | None
+    """Where the belt goes that is led past the loss of its stability: the minimum downhill, if one was found."""
+    snapped_parameter: float | None
+    """Where that is: a little past the event."""
+
+
+class _Report(NamedTuple):
+    """What the core reports of all states of a branch, in its order."""
+
+    parameter: Floats
+    energy: Floats
+    height: Floats
+    force: Floats
+    moment: Floats
+    least_bend_radius: Floats
+    least_spine_radius: Floats
+    rib_margin: Floats
+
+
+class Branch:
+    """A curve of equilibria, its states in order; m of them, with n nodes each.
+
+    What is reported of the states is computed when it is first asked for. Arrays are the caller's own.
+
+    Units: those of the scenario.
+    """
+
+    def __init__(self, inner: _core.Diagram, index: int, start: Equilibrium) -> None:
+        self._inner = inner
+        self._index = index
+        self._start = start
+        origin = inner.origin(index)
+        self.origin: Origin | None = None if origin is None else Origin(*origin)
+        """The event of another branch where it begins; None of the first, which begins with the path."""
+        self.end: End = inner.end(index)
+        """Why it ends: with the path ("range"), where it began ("closed"), with `states` of `follow` ("budget"), or
+        because no step, however short, leads on ("lost")."""
+        self.events: list[Event] = [_event(*event) for event in inner.events(index)]
+        """Its events in order."""
+
+    def __len__(self) -> int:
+        return self._inner.states(self._index)
+
+    @property
+    def parameter(self) -> Floats:
+        """How far along the path, in what the diagram's `parameter_name` says.
+
+        Shapes: (m,).
+        """
+        return self._report.parameter.copy()
+
+    @property
+    def energy(self) -> Floats:
+        """Total potential, loads included.
+
+        Shapes: (m,).
+        """
+        return self._report.energy.copy()
+
+    @property
+    def height(self) -> Floats:
+        """How far the highest point of the spine is along the scenario's `bulge`.
+
+        Shapes: (m,).
+        """
+        return self._report.height.copy()
+
+    @property
+    def negative_modes(self) -> NDArray[np.int64]:
+        """Number of independent motions along which the energy falls.
+
+        Shapes: (m,).
+        """
+        return np.array(self._inner.negative_modes(self._index), dtype=np.int64)
+
+    @property
+    def stable(self) -> NDArray[np.bool_]:
+        """Whether there is no such motion; next to an event that is decided by rounding.
+
+        Shapes: (m,).
+        """
+        return np.equal(self.negative_modes, 0)
+
+    @property
+    def least_bend_radius(self) -> Floats:
+        """The tightest bend of the whole belt; NaN where nothing bends. See `Equilibrium.least_bend_radius`.
+
+        Shapes: (m,).
+        """
+        return self._report.least_bend_radius.copy()
+
+    @property
+    def least_spine_radius(self) -> Floats:
+        """The tightest bend on the spine; NaN where nothing bends.
+
+        Shapes: (m,).
+        """
+        return self._report.least_spine_radius.copy()
+
+    @property
+    def rib_margin(self) -> Floats:
+        """How far the ribs are from crossing inside the belt.
+
+        Shapes: (m,).
+        Source: Eq. (33).
+        """
+        return self._report.rib_margin.copy()
+
+    @property
+    def position(self) -> Floats:
+        """Spine positions x(u).
+
+        Shapes: (m, n, 3).
+        """
+        return self._positions.copy()
+
+    def reaction(self, support: Place) -> Reaction:
+        """What a support does to the belt in every state, named as for `Equilibrium.reaction`.
+
+        Shapes: (m, 3) each.
+        Errors: `NoSupport`.
+        """
+        index = _index_of(self._start, support)
+        return Reaction(self._report.force[:, index].copy(), self._report.moment[:, index].copy())
+
+    def equilibrium(self, state: int) -> Equilibrium:
+        """Everything about a state, by its index; negative ones count from the end.
+
+        Errors: `InvalidArgument` where there is no such state.
+        """
+        count = len(self)
+        if not _is_whole(state) or not -count <= state < count:
+            raise InvalidArgument(f"state: found {state}, allowed {-count} to {count - 1}")
+        scenario, found = self._inner.equilibrium(self._index, int(state) % count)
+        return Equilibrium(Scenario._wrap(scenario), found)  # noqa: SLF001 - of this package
+
+    @functools.cached_property
+    def _report(self) -> _Report:
+        return _Report(*self._inner.report(self._index))
+
+    @functools.cached_property
+    def _positions(self) -> Floats:
+        return np.stack(self._inner.positions(self._index))
+
+    def __repr__(self) -> str:
+        return f"<Branch: {len(self)} states, {len(self.events)} events, end {self.end!r}>"
+
+
+class Diagram:
+    """The branches of equilibria that hang together along a path."""
+
+    def __init__(self, inner: _core.Diagram, start: Equilibrium, parameter_name: str, support: int | None) -> None:
+        self.start = start
+        """The equilibrium that was followed."""
+        self.parameter_name = parameter_name
+        """What `parameter` is: the field where one number changes, "share of the path" where several do, 0 to 1, and of
+        poses "place on the path", 0 at the support's own and 1, 2, … at those given."""
+        last = len(start._inner.reactions) - 1  # noqa: SLF001 - of this package
+        self.support = support if support is not None else last if last >= 0 else None
+        """Index of the support that the path moves, or else of the last one; None where there is none."""
+        self.branches = [Branch(inner, index, start) for index in range(inner.branches)]
+        """First the one that is followed from where the path begins, then those that branch off, in the order found."""
+
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario where the path begins."""
+        return self.start.scenario
+
+    def table(self) -> Columns:
+        """A report on all states of all branches, as columns: for `pandas.DataFrame(…)` or a CSV file.
+
+        They are branch, state, parameter, energy, height, stable, negative_modes, event (its kind, or empty),
+        supports[0].force.x … supports[k].moment.z, least_bend_radius, least_spine_radius, rib_margin. Where nothing
+        bends the radii are NaN.
+
+        Shapes: (number of states,) each.
+        """
+        tables = [_columns(index, branch) for index, branch in enumerate(self.branches)]
+        return {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
+
+    def to_dict(self) -> dict[str, Any]:
+        """The diagram as plain numbers, lists and text, schema "fishbone.diagram/1"; each state with all its result."""
+        return {
+            "schema": SCHEMA,
+            "parameter_name": self.parameter_name,
+            "scenario": self.scenario.to_dict(),
+            "branches": [_branch_to_dict(branch) for branch in self.branches],
+        }
+
+    def __repr__(self) -> str:
+        states = sum(map(len, self.branches))
+        events = sum(len(branch.events) for branch in self.branches)
+        return f"<Diagram: {self.parameter_name}, {len(self.branches)} branches, {states} states, {events} events>"
+
+
+def follow(  # noqa: PLR0913 - keywords all but two
+    scenario: Scenario | Equilibrium,
+    path: Mapping[str, float | npt.ArrayLike] | Poses,
+    *,
+    step: float = 0.05,
+    states: int = 1000,
+    branches: int = 10,
+    progress: Callable[[int, float], object] | None = None,
+) -> Diagram:
+    """Follows an equilibrium along a path, through folds and instabilities, and all that branches off it.
+
+    A scenario is solved first. The path begins with it, and is either a mapping of fields to their last values, such as
+    `{"supports[1].position[2]": 0.4}`, or `Poses`. A list stands for its numbers, by their places: of
+    `{"supports[1].position": [0, 0.7, 0.4]}` they are `supports[1].position[0]`, `[1]` and `[2]`. All numbers change
+    together, linearly, from what the scenario gives.
+
+    `step` is the longest along a branch, which counts the path, from 0 to 1 or to the number of poses, and the motion
+    of the belt in U alike; `states` are the most of a branch, and `branches` the most in all. `progress(branch, share
+    of the path)` is called now and then from the calling thread; the share falls where a branch has turned back. Other
+    threads run meanwhile, and Ctrl-C ends it.
+
+    Errors: `NoPath` where the scenario gives no such numbers, where nothing changes, and where the scenario at the end
+    of the path is not valid; `NoBranch` where the start has not converged or may move at no cost of energy;
+    `NoSupport`; `InvalidArgument`; whatever `progress` raises.
+    """
+    _check(step, states, branches)
+    if not isinstance(scenario, Scenario | Equilibrium):
+        raise InvalidArgument(f"scenario: found {type(scenario).__name__}, allowed a Scenario or an Equilibrium")
+    if isinstance(path, Poses):
+        start = _solved(scenario)
+        way = _led(start, path)
+    else:
+        # What is no path is refused before a long solve.
+        way = _changed(scenario if isinstance(scenario, Scenario) else scenario.scenario, path)
+        start = _solved(scenario)
+    try:
+        inner = _core.follow(start._inner, way.inner, float(step), int(states), int(branches), progress)  # noqa: SLF001
+    except ValueError as error:
+        # What `progress` or a signal's handler has raised comes from deeper down.
+        if error.__traceback__ is not None and error.__traceback__.tb_next is not None:
+            raise
+        raise NoBranch(str(error)) from None
+    return Diagram(inner, start, way.parameter_name, way.support)
+
+
+# ------------------------------------------------------------------------------------------------------- the path
+
+
+class _Way(NamedTuple):
+    """A path as the core knows it, what its parameter is called, and the support that it moves."""
+
+    inner: _core.Path
+    parameter_name: str
+    support: int | None
+
+
+def _changed(scenario: Scenario, path: Mapping[str, Any]) -> _Way:
+    """The path of numbers."""
+    if not isinstance(path, Mapping):
+        raise InvalidArgument(f"path: found {type(path).__name__}, allowed fields with their last values, or Poses")
+    numbers = [number for field, value in path.items() for number in _numbers(field, value)]
+    fields = [field for field, _ in numbers]
+    for field in fields:
+        if fields.count(field) > 1:
+            raise InvalidArgument(f"{field}: found twice in the path, allowed once")
+    try:
+        inner = _core.Path.numbers(scenario._inner, numbers)  # noqa: SLF001 - of this package
+    except ValueError as error:
+        raise NoPath(str(error)) from None
+    moved = (re.match(r"supports\[(\d+)\]", field) for field in fields)
+    support = next((int(found[1]) for found in moved if found is not None), None)
+    return _Way(inner, fields[0] if len(fields) == 1 else "share of the path", support)
+
+
+def _numbers(field: str, value: Any) -> Iterator[tuple[str, float]]:  # noqa: ANN401 - whatever a caller may bring
+    """A field with its number, or each of its numbers."""
+    if not isinstance(field, str):
+        raise InvalidArgument(f"path: found the field {field!r}, allowed a name such as supports[1].position[2]")
+    value = value.tolist() if hasattr(value, "tolist") else value
+    if isinstance(value, list | tuple):
+        for index, item in enumerate(value):
+            yield from _numbers(f"{field}[{index}]", item)
+    elif _is_number(value):
+        yield field, float(value)
+    else:
+        raise InvalidArgument(f"{field}: found {value!r}, allowed a finite number or a list of such")
+
+
+def _led(start: Equilibrium, path: Poses) -> _Way:
+    """The path of a support's poses."""
+    if path.motion not in {"straight", "screw"}:
+        raise InvalidArgument(f'motion: found {path.motion!r}, allowed "straight" or "screw"')
+    if not isinstance(path.poses, Iterable):
+        raise InvalidArgument(f"poses: found {path.poses!r}, allowed pairs of a position and a rotation")
+    poses = []
+    for index, pose in enumerate(path.poses):
+        try:
+            position, rotation = pose
+        except (TypeError, ValueError):
+            raise InvalidArgument(f"poses[{index}]: found {pose!r}, allowed a position and a rotation") from None
+        poses.append((triple(f"poses[{index}][0]", position), triple(f"poses[{index}][1]", rotation)))
+    # The source's method knows no reactions, and cannot be followed wherever the support is.
+    support = _index_of(start, path.support) if start._inner.reactions else 0  # noqa: SLF001 - of this package
+    try:
+        inner = _core.Path.poses(start.scenario._inner, support, poses, path.motion == "screw")  # noqa: SLF001
+    except ValueError as error:
+        raise NoPath(str(error)) from None
+    return _Way(inner, "place on the path", support)
+
+
+def _solved(scenario: Scenario | Equilibrium) -> Equilibrium:
+    return scenario if isinstance(scenario, Equilibrium) else solve(scenario)
+
+
+def _check(step: float, states: int, branches: int) -> None:
+    if not _is_number(step) or not 0.0 < step <= MAX_STEP:
+        raise InvalidArgument(f"step: found {step!r}, allowed above 0 up to {MAX_STEP:g}")
+    if not _is_whole(states) or not MIN_STATES <= states <= MAX_STATES:
+        raise InvalidArgument(f"states: found {states!r}, allowed {MIN_STATES} to {MAX_STATES}")
+    if not _is_whole(branches) or not 1 <= branches <= MAX_BRANCHES:
+        raise InvalidArgument(f"branches: found {branches!r}, allowed 1 to {MAX_BRANCHES}")
+
+
+def _is_number(number: object) -> bool:
+    """Whether it is one that a finite float can hold."""
+    if not isinstance(number, int | float | np.integer | np.floating) or isinstance(number, bool):
+        return False
+    try:
+        return math.isfinite(number)
+    except OverflowError:
+        return False
+
+
+def _is_whole(number: object) -> bool:
+    return isinstance(number, int | np.integer) and not isinstance(number, bool)
+
+
+def _index_of(start: Equilibrium, support: Place) -> int:
+    return start._support_index(support)  # noqa: SLF001 - of this package
+
+
+# ----------------------------------------------------------------------------------------------------- the results
+
+
+def _event(
+    kind: Kind,
+    parameter: float,
+    state: int,
+    negative_modes: tuple[int, int],
+    snapped: tuple[float, _core.Scenario, _core.Equilibrium] | None,
+) -> Event:
+    if snapped is None:
+        return Event(kind, parameter, state, negative_modes, None, None)
+    place, scenario, found = snapped
+    equilibrium = Equilibrium(Scenario._wrap(scenario), found)  # noqa: SLF001 - of this package
+    return Event(kind, parameter, state, negative_modes, equilibrium, place)
+
+
+def _columns(index: int, branch: Branch) -> Columns:
+    count = len(branch)
+    kinds = [""] * count
+    for event in branch.events:
+        kinds[event.state] = event.kind
+    columns: Columns = {
+        "branch": np.full(count, index),
+        "state": np.arange(count),
+        "parameter": branch.parameter,
+        "energy": branch.energy,
+        "height": branch.height,
+        "stable": branch.stable,
+        "negative_modes": branch.negative_modes,
+        "event": np.array(kinds),
+    }
+    supports = len(branch._start._inner.reactions)  # noqa: SLF001 - of this package
+    for support in range(supports):
+        for quantity, vectors in branch.reaction(support)._asdict().items():
+            columns |= {f"supports[{support}].{quantity}.{axis}": vectors[:, i] for i, axis in enumerate("xyz")}
+    return columns | {
+        "least_bend_radius": branch.least_bend_radius,
+        "least_spine_radius": branch.least_spine_radius,
+        "rib_margin": branch.rib_margin,
+    }
+
+
+def _branch_to_dict(branch: Branch) -> dict[str, Any]:
+    parameter, negative_modes = branch.parameter.tolist(), branch.negative_modes.tolist()
+    return {
+        "origin": None if branch.origin is None else branch.origin._asdict(),
+        "end": branch.end,
+        "events": [_event_to_dict(event) for event in branch.events],
+        "states": [
+            {
+                "parameter": parameter[state],
+                "negative_modes": negative_modes[state],
+                "result": branch.equilibrium(state).to_dict(),
+            }
+            for state in range(len(branch))
+        ],
+    }
+
+
+def _event_to_dict(event: Event) -> dict[str, Any]:
+    snapped = None
+    if event.snapped is not None:
+        snapped = {"parameter": event.snapped_parameter, "result": event.snapped.to_dict()}
+    return {
+        "kind": event.kind,
+        "parameter": event.parameter,
+        "state": event.state,
+        "negative_modes": list(event.negative_modes),
+        "snapped": snapped,
+    }
