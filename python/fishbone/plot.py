@@ -1,4 +1,4 @@
-"""Pictures of an equilibrium; needs `pip install "fishbone[plot]"`."""
+"""Pictures of an equilibrium and of a diagram; needs `pip install "fishbone[plot]"`."""
 
 from __future__ import annotations
 
@@ -21,6 +21,8 @@ try:
 except ImportError:
     raise MissingPackage("matplotlib", "plot") from None
 
+from fishbone import chart
+from fishbone.follow import Diagram
 from fishbone.scene import (
     ARROW,
     AXES,
@@ -58,6 +60,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from fishbone.equilibrium import Equilibrium, Floats
+    from fishbone.tracker import Place
 
     Style = dict[str, Any]
 
@@ -84,6 +87,8 @@ _METADATA: dict[str, dict[str, Any]] = {
 _X, _Y, _Z = 0, 1, 2
 _WIDTH, _DECORATION, _GRAPHS, _KEY = 7.0, 0.6, 2.0, 0.55
 """Page width, and heights of what surrounds the views, of the graphs and of the key [in]."""
+_PANEL = 1.9
+"""Height of a panel of a diagram [in]."""
 _FLAT_HEIGHTS = (0.35, 2.4)
 
 # Third-angle projection: the top view stands over the front view, the view from the right stands right of it.
@@ -130,8 +135,23 @@ def oblique(equilibrium: Equilibrium, viewer: ArrayLike = VIEWER) -> Figure:
         return figure
 
 
-def encode(equilibrium: Equilibrium, suffix: str) -> bytes:
+def diagram(diagram: Diagram, support: Place | None = None) -> Figure:
+    """Energy, height and the force of a support over the parameter: lines of stable states are solid, others dashed.
+
+    Markers are the events; arrows lead from where stability is lost to where the belt snaps. `support` is named as for
+    `Equilibrium.reaction`; if None it is the one that the path moves, or the last. A belt without any has no force to
+    show.
+
+    Errors: `NoSupport`.
+    """
+    with mpl.rc_context(_STYLE):
+        return _draw_diagram(diagram, support)
+
+
+def encode(subject: Equilibrium | Diagram, suffix: str) -> bytes:
     """The picture's file content, by the suffix of its name; equal for equal shapes as PNG and PDF.
+
+    Of an equilibrium it is that of `views`.
 
     Errors: `InvalidArgument` where the suffix is none of `SUFFIXES`.
     """
@@ -139,19 +159,19 @@ def encode(equilibrium: Equilibrium, suffix: str) -> bytes:
     if suffix not in SUFFIXES:
         raise InvalidArgument(f"figure: found {suffix or 'no suffix'}, allowed {', '.join(SUFFIXES)}")
     content = io.BytesIO()
-    figure = views(equilibrium)
+    figure = diagram(subject) if isinstance(subject, Diagram) else views(subject)
     with mpl.rc_context(_STYLE):
         figure.savefig(content, format=suffix[1:], metadata=_METADATA[suffix])
     return content.getvalue()
 
 
-def save(equilibrium: Equilibrium, path: str | os.PathLike[str]) -> None:
+def save(subject: Equilibrium | Diagram, path: str | os.PathLike[str]) -> None:
     """Writes the picture to a file, .png, .pdf or .svg.
 
     Errors: `InvalidArgument` for another suffix, `OSError`.
     """
     path = Path(path)
-    write_whole(path, encode(equilibrium, path.suffix))
+    write_whole(path, encode(subject, path.suffix))
 
 
 def _check(equilibrium: Equilibrium) -> None:
@@ -247,6 +267,22 @@ def _key(equilibrium: Equilibrium) -> Iterator[Line2D | Patch]:
         yield Line2D([], [], label="force", color=ARROW["color"], **arrow)
     if gravity_of(tables).any():
         yield Line2D([], [], label="gravity", color=GRAVITY["color"], **arrow)
+
+
+# --------------------------------------------------------------------------------------------------- the diagram
+
+
+def _draw_diagram(diagram: Diagram, support: Place | None) -> Figure:
+    panels = list(chart.panels(diagram, support))
+    figure = Figure(figsize=(_WIDTH, _PANEL * len(panels) + _DECORATION + _KEY), layout="constrained")
+    axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
+    for panel, part in zip(panels, axes, strict=True):
+        chart.draw(part, diagram, panel)
+    axes[-1].set_xlabel(diagram.parameter_name, parse_math=False)
+    figure.align_ylabels(axes)
+    figure.suptitle(diagram.scenario.to_dict().get("name") or "belt", fontsize=10.0, parse_math=False)
+    figure.legend(handles=list(chart.key(diagram)), loc="outside lower center", ncols=6, frameon=False)
+    return figure
 
 
 # ------------------------------------------------------------------------------------------------- the flat board

@@ -1,0 +1,152 @@
+"""Bifurcation diagrams: quantities along the branches of a diagram, drawn into axes."""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.lines import Line2D
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    from fishbone.equilibrium import Equilibrium
+    from fishbone.follow import Branch, Diagram, Kind
+    from fishbone.tracker import Place
+
+    Floats = NDArray[np.float64]
+    Style = dict[str, Any]
+
+STABLE: Style = {"linestyle": "-", "linewidth": 1.3}
+UNSTABLE: Style = {"linestyle": (0, (3.0, 1.8)), "linewidth": 0.9}
+_MARKER: Style = {"linestyle": "", "markersize": 5.0, "markeredgecolor": "black", "markeredgewidth": 0.8, "zorder": 4}
+MARKERS: dict[Kind, Style] = {
+    "fold": {"marker": "o", "markerfacecolor": "white", **_MARKER},
+    "pitchfork": {"marker": "^", "markerfacecolor": "black", **_MARKER},
+    "transcritical": {"marker": "X", "markerfacecolor": "0.6", **_MARKER},
+    "bifurcation": {"marker": "s", "markerfacecolor": "0.6", **_MARKER},
+}
+SNAP: Style = {
+    "arrowstyle": "-|>",
+    "color": "0.35",
+    "linewidth": 0.6,
+    "mutation_scale": 7.0,
+    "shrinkA": 3.0,
+    "shrinkB": 0.0,
+}
+SHORTEST_SNAP = 0.02
+"""An arrow shorter than this share of an axis is not drawn: there another branch takes over without a jump."""
+MAX_NAMED = 10
+"""The key names no more branches than this: their colours could not be told apart."""
+COLORS = ("viridis", 0.1, 0.8)
+"""A colour map whose lightness rises steadily, so that branches stay apart in grey, and its part that shows on white."""
+
+
+class Panel(NamedTuple):
+    """A quantity to be drawn over the parameter."""
+
+    label: str
+    along: Callable[[Branch], Floats]
+    """Its values in the states of a branch."""
+    at: Callable[[Equilibrium], float]
+    """Its value in an equilibrium."""
+
+
+def panels(diagram: Diagram, support: Place | None) -> Iterator[Panel]:
+    """Energy, height, and the force of a support where there is one.
+
+    Errors: `NoSupport`.
+    """
+    bulge = np.array(diagram.scenario.to_dict()["solver"]["bulge"])
+    bulge /= np.linalg.norm(bulge)
+    yield Panel("energy", lambda branch: branch.energy, lambda shape: shape.energy)
+    yield Panel(
+        "height [length]", lambda branch: branch.height, lambda shape: float(shape.highest_point.position @ bulge)
+    )
+    held = diagram.support if support is None else support
+    if held is not None:
+        diagram.start.reaction(held)
+        name = f"supports[{held}]" if isinstance(held, int) else str(held)
+        yield Panel(
+            f"|force|, {name}",
+            lambda branch: np.linalg.norm(branch.reaction(held).force, axis=1),
+            lambda shape: float(np.linalg.norm(shape.reaction(held).force)),
+        )
+
+
+def draw(axes: Axes, diagram: Diagram, panel: Panel) -> None:
+    """Draws a quantity over the parameter: the branches, their events, and what the belt snaps to."""
+    curves = [np.column_stack([branch.parameter, panel.along(branch)]) for branch in diagram.branches]
+    for branch, curve, color in zip(diagram.branches, curves, colors(diagram), strict=True):
+        for states, is_stable in runs(branch):
+            axes.plot(*curve[states].T, color=color, **(STABLE if is_stable else UNSTABLE))
+        if branch.origin is not None:
+            # The first state is a little off the event.
+            event = diagram.branches[branch.origin.branch].events[branch.origin.event]
+            root = np.array([curves[branch.origin.branch][event.state], curve[0]])
+            axes.plot(*root.T, color=color, **(STABLE if branch.stable[0] else UNSTABLE))
+        for event in branch.events:
+            axes.plot(*curve[event.state], **MARKERS[event.kind])
+    axes.set(ylabel=panel.label)
+    axes.grid(visible=True, color="0.9", linewidth=0.5)
+    for start, end in _snaps(diagram, panel, curves, SHORTEST_SNAP * np.ptp(axes.get_ylim())):
+        axes.annotate("", end, start, arrowprops=SNAP)
+
+
+def runs(branch: Branch) -> Iterator[tuple[slice, bool]]:
+    """The stretches of a branch that are stable throughout or not, as their states, each from one event to another.
+
+    The number of negative modes in the very state of an event is a matter of rounding: what counts is that before it
+    and beyond.
+    """
+    behind, ahead = branch.negative_modes, branch.negative_modes
+    for event in branch.events:
+        behind[event.state], ahead[event.state] = event.negative_modes
+    is_stable = (ahead[:-1] == 0) & (behind[1:] == 0)
+    bounds = [0, *(np.flatnonzero(np.diff(is_stable)) + 1).tolist(), len(is_stable)]
+    for first, last in itertools.pairwise(bounds):
+        if first < last:
+            yield slice(first, last + 1), bool(is_stable[first])
+
+
+def colors(diagram: Diagram) -> list[Any]:
+    """One for each branch; black where there is only one."""
+    if len(diagram.branches) == 1:
+        return ["black"]
+    name, darkest, lightest = COLORS
+    return list(mpl.colormaps[name](np.linspace(darkest, lightest, len(diagram.branches))))
+
+
+def key(diagram: Diagram) -> Iterator[Line2D]:
+    """What lines, markers and arrows mean, of those that the picture has."""
+    stretches = {is_stable for branch in diagram.branches for _, is_stable in runs(branch)}
+    events = [event for branch in diagram.branches for event in branch.events]
+    kinds = {event.kind for event in events}
+    for is_stable, label, style in ((True, "stable", STABLE), (False, "unstable", UNSTABLE)):
+        if is_stable in stretches:
+            yield Line2D([], [], label=label, color="black", **style)
+    for kind, style in MARKERS.items():
+        if kind in kinds:
+            yield Line2D([], [], label=kind, **style)
+    if any(event.snapped is not None for event in events):
+        yield Line2D([], [], label="snap", color=SNAP["color"], linestyle="", marker="$→$", markersize=9.0)
+    if 1 < len(diagram.branches) <= MAX_NAMED:
+        for index, color in enumerate(colors(diagram)):
+            yield Line2D([], [], label=f"branch {index}", color=color, linewidth=2.5)
+
+
+def _snaps(
+    diagram: Diagram, panel: Panel, curves: list[Floats], shortest: float
+) -> Iterator[tuple[tuple[float, float], tuple[float, float]]]:
+    """From where to where the belt snaps, of the ways that are not too short to be seen."""
+    for branch, curve in zip(diagram.branches, curves, strict=True):
+        for event in branch.events:
+            if event.snapped is not None and event.snapped_parameter is not None:
+                (parameter, before), after = curve[event.state].tolist(), panel.at(event.snapped)
+                if abs(after - before) > shortest:
+                    yield (parameter, before), (event.snapped_parameter, after)
