@@ -41,10 +41,11 @@ SNAP: Style = {
 }
 SHORTEST_SNAP = 0.02
 """An arrow shorter than this share of an axis is not drawn: there another branch takes over without a jump."""
+LANDED: Style = {"linestyle": "", "marker": ".", "markersize": 4.0, "color": "0.35", "zorder": 3}
 MAX_NAMED = 10
 """The key names no more branches than this: their colours could not be told apart."""
 COLORS = ("viridis", 0.1, 0.8)
-"""A colour map whose lightness rises steadily, so that branches stay apart in grey, and its part that shows on white."""
+"""A colour map whose lightness rises steadily, so that branches stay apart in grey, and the part of it to use."""
 
 
 class Panel(NamedTuple):
@@ -68,19 +69,17 @@ def panels(diagram: Diagram, support: Place | None) -> Iterator[Panel]:
     yield Panel(
         "height [length]", lambda branch: branch.height, lambda shape: float(shape.highest_point.position @ bulge)
     )
-    held = diagram.support if support is None else support
-    if held is not None:
-        diagram.start.reaction(held)
-        name = f"supports[{held}]" if isinstance(held, int) else str(held)
+    index = diagram.support if support is None else diagram.start._support_index(support)  # noqa: SLF001
+    if index is not None:
         yield Panel(
-            f"|force|, {name}",
-            lambda branch: np.linalg.norm(branch.reaction(held).force, axis=1),
-            lambda shape: float(np.linalg.norm(shape.reaction(held).force)),
+            f"|force| of supports[{index}]",
+            lambda branch: np.linalg.norm(branch.reaction(index).force, axis=1),
+            lambda shape: float(np.linalg.norm(shape.reaction(index).force)),
         )
 
 
-def draw(axes: Axes, diagram: Diagram, panel: Panel) -> None:
-    """Draws a quantity over the parameter: the branches, their events, and what the belt snaps to."""
+def draw(axes: Axes, diagram: Diagram, panel: Panel) -> bool:
+    """Draws a quantity over the parameter: the branches, their events, and snaps; says whether any can be seen."""
     curves = [np.column_stack([branch.parameter, panel.along(branch)]) for branch in diagram.branches]
     for branch, curve, color in zip(diagram.branches, curves, colors(diagram), strict=True):
         for states, is_stable in runs(branch):
@@ -94,8 +93,14 @@ def draw(axes: Axes, diagram: Diagram, panel: Panel) -> None:
             axes.plot(*curve[event.state], **MARKERS[event.kind])
     axes.set(ylabel=panel.label)
     axes.grid(visible=True, color="0.9", linewidth=0.5)
-    for start, end in _snaps(diagram, panel, curves, SHORTEST_SNAP * np.ptp(axes.get_ylim())):
+    snaps = list(_snaps(diagram, panel, curves))
+    for _, end in snaps:
+        axes.plot(*end, **LANDED)
+    shortest = SHORTEST_SNAP * np.ptp(axes.get_ylim())
+    seen = [(start, end) for start, end in snaps if abs(end[1] - start[1]) > shortest]
+    for start, end in seen:
         axes.annotate("", end, start, arrowprops=SNAP)
+    return bool(seen)
 
 
 def runs(branch: Branch) -> Iterator[tuple[slice, bool]]:
@@ -122,18 +127,17 @@ def colors(diagram: Diagram) -> list[Any]:
     return list(mpl.colormaps[name](np.linspace(darkest, lightest, len(diagram.branches))))
 
 
-def key(diagram: Diagram) -> Iterator[Line2D]:
+def key(diagram: Diagram, *, snaps: bool) -> Iterator[Line2D]:
     """What lines, markers and arrows mean, of those that the picture has."""
     stretches = {is_stable for branch in diagram.branches for _, is_stable in runs(branch)}
-    events = [event for branch in diagram.branches for event in branch.events]
-    kinds = {event.kind for event in events}
+    kinds = {event.kind for branch in diagram.branches for event in branch.events}
     for is_stable, label, style in ((True, "stable", STABLE), (False, "unstable", UNSTABLE)):
         if is_stable in stretches:
             yield Line2D([], [], label=label, color="black", **style)
     for kind, style in MARKERS.items():
         if kind in kinds:
             yield Line2D([], [], label=kind, **style)
-    if any(event.snapped is not None for event in events):
+    if snaps:
         yield Line2D([], [], label="snap", color=SNAP["color"], linestyle="", marker="$→$", markersize=9.0)
     if 1 < len(diagram.branches) <= MAX_NAMED:
         for index, color in enumerate(colors(diagram)):
@@ -141,12 +145,11 @@ def key(diagram: Diagram) -> Iterator[Line2D]:
 
 
 def _snaps(
-    diagram: Diagram, panel: Panel, curves: list[Floats], shortest: float
+    diagram: Diagram, panel: Panel, curves: list[Floats]
 ) -> Iterator[tuple[tuple[float, float], tuple[float, float]]]:
-    """From where to where the belt snaps, of the ways that are not too short to be seen."""
+    """From where to where the belt snaps."""
     for branch, curve in zip(diagram.branches, curves, strict=True):
         for event in branch.events:
             if event.snapped is not None and event.snapped_parameter is not None:
-                (parameter, before), after = curve[event.state].tolist(), panel.at(event.snapped)
-                if abs(after - before) > shortest:
-                    yield (parameter, before), (event.snapped_parameter, after)
+                parameter, before = curve[event.state].tolist()
+                yield (parameter, before), (event.snapped_parameter, panel.at(event.snapped))

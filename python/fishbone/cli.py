@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
+import csv
+import io
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,13 +13,15 @@ import click
 
 import fishbone
 from fishbone import examples as shipped
-from fishbone.errors import FishboneError
+from fishbone.errors import FishboneError, NoBranch
 from fishbone.files import check_writable, write_whole
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from fishbone.equilibrium import Equilibrium
+    from fishbone.follow import Columns, Diagram
+    from fishbone.tracker import Place
 
 
 class Failure(click.ClickException):
@@ -32,7 +37,7 @@ class Invalid(Failure):
 
 
 class NoEquilibrium(Failure):
-    """The solve ended without an equilibrium."""
+    """The solve ended without an equilibrium, or there is none to follow."""
 
     exit_code = 3
 
@@ -104,8 +109,7 @@ def solve(file: Path, *, out: Path | None, figure: Path | None, mesh: Path | Non
     Exit code: 0 converged, 2 invalid input, 3 infeasible or not converged.
     """
     pictures = _pictures(figure, mesh)
-    if out is not None and out.resolve() == file.resolve():
-        raise Invalid(f"{out}: found the scenario itself, allowed another file")
+    _spare(file, out)
     equilibrium = fishbone.solve(fishbone.load(file))
     # All is made before anything is written, so that a failure leaves nothing behind.
     contents = {}
@@ -113,9 +117,13 @@ def solve(file: Path, *, out: Path | None, figure: Path | None, mesh: Path | Non
         contents[out] = encode(equilibrium.to_dict()).encode()
     if equilibrium.status == "converged":
         contents |= {path: encode_picture(equilibrium, path.suffix) for path, encode_picture in pictures}
-    for path, content in contents.items():
-        _write(path, content)
+    _write_all(contents)
     _print(equilibrium, file, as_json=as_json)
+
+
+def _spare(file: Path, out: Path | None) -> None:
+    if out is not None and out.resolve() == file.resolve():
+        raise Invalid(f"{out}: found the scenario itself, allowed another file")
 
 
 def _pictures(figure: Path | None, mesh: Path | None) -> list[tuple[Path, Callable[[Equilibrium, str], bytes]]]:
@@ -139,6 +147,11 @@ def encode(result: dict[str, Any]) -> str:
     return "{\n" + ",\n".join(fields) + "\n}\n"
 
 
+def _write_all(contents: dict[Path, bytes]) -> None:
+    for path, content in contents.items():
+        _write(path, content)
+
+
 def _write(path: Path, content: bytes) -> None:
     try:
         write_whole(path, content)
@@ -160,6 +173,170 @@ def _print(equilibrium: Equilibrium, file: Path, *, as_json: bool) -> None:
         Console(highlight=False).print(report(equilibrium))
     for warning in equilibrium.warnings:
         click.echo(f"fishbone: {file}: warning: {warning}", err=True)
+
+
+@command.command()
+@click.argument("file", type=_PATH)
+@click.option(
+    "--to",
+    "numbers",
+    multiple=True,
+    metavar="FIELD=VALUE",
+    help='A number of the scenario and its last value, "supports[1].position[2]=0.4", or a list of numbers, '
+    '"supports[1].position=[0, 0.7, 0.4]". May be repeated: all change together.',
+)
+@click.option(
+    "--pose",
+    "poses",
+    multiple=True,
+    metavar='"X Y Z RX RY RZ"',
+    help="A pose to lead a support to: position and rotation vector. May be repeated: one after the other.",
+)
+@click.option("--support", metavar="PLACE", help='Which support to lead: "start", "end", index or arc length.  [end]')
+@click.option("--screw", is_flag=True, help="Lead it from pose to pose as a screw turns, not straight.")
+@click.option("--step", type=float, default=0.05, show_default=True, help="The longest step along a branch.")
+@click.option("--states", type=int, default=1000, show_default=True, help="The most states of a branch.")
+@click.option("--branches", type=int, default=10, show_default=True, help="The most branches.")
+@click.option("--out", type=_PATH, callback=_output(".json"), help="Write all states: .json.")
+@click.option("--table", type=_PATH, callback=_output(".csv"), help="Write a report on all states: .csv.")
+@click.option(
+    "--figure",
+    type=_PATH,
+    callback=_output(".png", ".pdf", ".svg"),
+    help="Draw energy, height and force along the path: .png, .pdf or .svg.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print all states as JSON instead of tables.")
+def follow(  # noqa: PLR0913 - one for each option
+    file: Path,
+    *,
+    numbers: tuple[str, ...],
+    poses: tuple[str, ...],
+    support: str | None,
+    screw: bool,
+    step: float,
+    states: int,
+    branches: int,
+    out: Path | None,
+    table: Path | None,
+    figure: Path | None,
+    as_json: bool,
+) -> None:
+    """Follow an equilibrium along a path.
+
+    FILE is .toml or .json. The path leads numbers of it to other values (--to), or a support through poses (--pose).
+    Branches are followed through folds and instabilities; they and their events are printed as tables.
+
+    Exit code: 0 followed, 2 invalid input, 3 no equilibrium to begin with.
+    """
+    path = _path_of(numbers, poses, support, screw=screw)
+    if figure is not None:
+        from fishbone import plot  # noqa: PLC0415
+    _spare(file, out)
+    scenario = fishbone.load(file)
+    try:
+        with _progress() as progress:
+            diagram = fishbone.follow(scenario, path, step=step, states=states, branches=branches, progress=progress)
+    except NoBranch as error:
+        raise NoEquilibrium(f"{file}: {' '.join(str(error).split())}") from error
+    # All is made before anything is written, so that a failure leaves nothing behind.
+    contents = {}
+    text = encode(diagram.to_dict()) if as_json or out is not None else ""
+    if out is not None:
+        contents[out] = text.encode()
+    if table is not None:
+        contents[table] = encode_table(diagram.table())
+    if figure is not None:
+        contents[figure] = plot.encode(diagram, figure.suffix)
+    _write_all(contents)
+    if as_json:
+        click.echo(text, nl=False)
+    else:
+        _print_diagram(diagram)
+
+
+def _path_of(
+    numbers: tuple[str, ...], poses: tuple[str, ...], support: str | None, *, screw: bool
+) -> dict[str, Any] | fishbone.Poses:
+    if bool(numbers) == bool(poses):
+        found = "--to and --pose" if numbers else "neither --to nor --pose"
+        raise Invalid(f"path: found {found}, allowed one of them")
+    if poses:
+        motion: Any = "screw" if screw else "straight"
+        return fishbone.Poses([_pose(pose) for pose in poses], _place(support or "end"), motion)
+    if screw or support is not None:
+        raise Invalid("path: found --support or --screw with --to, allowed with --pose")
+    path: dict[str, Any] = {}
+    for number in numbers:
+        field, sign, value = (part.strip() for part in number.partition("="))
+        if not (field and sign):
+            raise Invalid(f"--to: found {number!r}, allowed FIELD=VALUE, as in supports[1].position[2]=0.4")
+        if field in path:
+            raise Invalid(f"--to: found {field} twice, allowed once")
+        path[field] = _value(field, value)
+    return path
+
+
+def _value(field: str, text: str) -> float | list[float]:
+    is_list = text.startswith("[") and text.endswith("]")
+    try:
+        numbers = [float(part) for part in (text[1:-1] if is_list else text).split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) == 1 or (is_list and numbers):
+        return numbers if is_list else numbers[0]
+    raise Invalid(f"{field}: found {text!r}, allowed a number or a list such as [0, 0.7, 0.4]")
+
+
+def _pose(text: str) -> tuple[list[float], list[float]]:
+    try:
+        x, y, z, rx, ry, rz = map(float, text.replace(",", " ").split())
+    except ValueError:
+        raise Invalid(f"--pose: found {text!r}, allowed six numbers: position and rotation vector") from None
+    return [x, y, z], [rx, ry, rz]
+
+
+def _place(text: str) -> Place:
+    """A support as the package names it: an end, an index, an arc length."""
+    ends: dict[str, Place] = {"start": "start", "end": "end"}
+    if text in ends:
+        return ends[text]
+    for kind in (int, float):
+        with contextlib.suppress(ValueError):
+            return kind(text)
+    raise Invalid(f'--support: found {text!r}, allowed "start", "end", an index or an arc length')
+
+
+@contextlib.contextmanager
+def _progress() -> Iterator[Callable[[int, float], object] | None]:
+    """What shows how far it has come, on a terminal."""
+    from rich.console import Console  # noqa: PLC0415
+
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield None
+        return
+    from rich.progress import Progress  # noqa: PLC0415
+
+    with Progress(console=console, transient=True) as bar:
+        task = bar.add_task("branch 0", total=1.0)
+        yield lambda branch, share: bar.update(task, description=f"branch {branch}", completed=share)
+
+
+def encode_table(columns: Columns) -> bytes:
+    """Columns as CSV, with all digits."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))
+    return text.getvalue().encode()
+
+
+def _print_diagram(diagram: Diagram) -> None:
+    from rich.console import Console  # noqa: PLC0415
+
+    from fishbone.report import report_diagram  # noqa: PLC0415
+
+    Console(highlight=False).print(report_diagram(diagram))
 
 
 @command.command()

@@ -276,12 +276,13 @@ def _draw_diagram(diagram: Diagram, support: Place | None) -> Figure:
     panels = list(chart.panels(diagram, support))
     figure = Figure(figsize=(_WIDTH, _PANEL * len(panels) + _DECORATION + _KEY), layout="constrained")
     axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
-    for panel, part in zip(panels, axes, strict=True):
-        chart.draw(part, diagram, panel)
+    snaps = [chart.draw(part, diagram, panel) for part, panel in zip(axes, panels, strict=True)]
     axes[-1].set_xlabel(diagram.parameter_name, parse_math=False)
     figure.align_ylabels(axes)
     figure.suptitle(diagram.scenario.to_dict().get("name") or "belt", fontsize=10.0, parse_math=False)
-    figure.legend(handles=list(chart.key(diagram)), loc="outside lower center", ncols=6, frameon=False)
+    figure.legend(
+        handles=list(chart.key(diagram, snaps=any(snaps))), loc="outside lower center", ncols=6, frameon=False
+    )
     return figure
 
 

@@ -15,11 +15,18 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from fishbone.equilibrium import Equilibrium, Floats
+    from fishbone.follow import Branch, Diagram, Event
 
 DIGITS = 5
 """Significant digits: what a default mesh supports, about."""
 RIBS_MEET = 1e-3
 """Bend radius, in widths, below which it says no more than that ribs meet there."""
+ENDS = {
+    "closed": "ends where it began",
+    "budget": "has used up its states before the end of the path",
+    "lost": "ends where no step, however short, leads on",
+}
+"""What becomes of a branch that does not end with the path."""
 NOUGHT = 1e-9
 """Rib angle [degrees] that is rounding."""
 
@@ -29,6 +36,19 @@ def report(equilibrium: Equilibrium) -> Group:
     tables = equilibrium.scenario.to_dict()
     title = f"{tables.get('name') or 'belt'}: {equilibrium.energy_model} energy, {equilibrium.status}"
     return Group(Text(title, style="bold"), Text(_supports(equilibrium)), _scalars(equilibrium), _vectors(equilibrium))
+
+
+def report_diagram(diagram: Diagram) -> Group:
+    """All that the command line tells of a diagram: its branches and their events."""
+    name = diagram.scenario.to_dict().get("name") or "belt"
+    title = Text(f"{name}: equilibria along a path, parameter: {diagram.parameter_name}", style="bold")
+    ends = [
+        Text(f"branch {index} {ENDS[branch.end]}")
+        for index, branch in enumerate(diagram.branches)
+        if branch.end in ENDS
+    ]
+    has_events = any(branch.events for branch in diagram.branches)
+    return Group(title, _branches(diagram), *ends, _events(diagram) if has_events else Text("no events"))
 
 
 def number(value: float) -> str:
@@ -162,3 +182,50 @@ def _place(at: float | str, u: Floats) -> str:
         if math.isclose(at, end, abs_tol=1e-9 * u[-1]):
             return name
     return f"u = {number(at)}"
+
+
+# --------------------------------------------------------------------------------------------------- a diagram's
+
+
+def _branches(diagram: Diagram) -> Table:
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for heading in ("branch", "begins"):
+        table.add_column(heading)
+    for heading in ("stable", "parameter", "energy"):
+        table.add_column(heading, justify="right")
+    for index, branch in enumerate(diagram.branches):
+        stable = f"{np.count_nonzero(branch.stable)} of {len(branch)}"
+        table.add_row(
+            str(index), _beginning(diagram, branch), stable, *map(_from_to, (branch.parameter, branch.energy))
+        )
+    return table
+
+
+def _beginning(diagram: Diagram, branch: Branch) -> str:
+    if branch.origin is None:
+        return "with the path"
+    event = diagram.branches[branch.origin.branch].events[branch.origin.event]
+    return f"{event.kind} of {branch.origin.branch}"
+
+
+def _from_to(values: Floats) -> str:
+    return f"{number(values[0])} → {number(values[-1])}"
+
+
+def _events(diagram: Diagram) -> Table:
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for heading in ("branch", "event"):
+        table.add_column(heading)
+    for heading in ("parameter", "negative modes", "energy", "after the snap"):
+        table.add_column(heading, justify="right")
+    for index, branch in enumerate(diagram.branches):
+        energy = branch.energy
+        for event in branch.events:
+            table.add_row(str(index), *_event(event, energy[event.state]))
+    return table
+
+
+def _event(event: Event, energy: float) -> list[str]:
+    before, after = event.negative_modes
+    snapped = "" if event.snapped is None else number(event.snapped.energy)
+    return [event.kind, number(event.parameter), f"{before} → {after}", number(energy), snapped]
