@@ -30,3 +30,9 @@ def out_of_reach(example: fb.Scenario) -> fb.Scenario:
     tables = example.to_dict()
     tables["supports"][1]["position"] = [0.0, 2.0, 0.0]
     return fb.Scenario.from_dict(tables)
+
+
+@pytest.fixture(scope="session")
+def turned() -> fb.Diagram:
+    """A planar arch whose end is turned against it: a fold, and a snap."""
+    return fb.follow(fb.load(ROOT / "scenarios" / "planar.toml"), {"supports[1].rotation[2]": -1.5})

@@ -1,3 +1,4 @@
+import csv
 import json
 import os
 import subprocess
@@ -308,3 +309,189 @@ def test_nothing_is_written_where_a_picture_cannot_be_made(run, monkeypatch, exa
     assert code == 2
     assert_one_line(err, "no picture")
     assert list(Path().iterdir()) == []
+
+
+# ------------------------------------------------------------------------------------------------------- follow
+
+
+@pytest.fixture
+def planar_file(example_file):
+    return example_file.with_name("planar.toml")
+
+
+TURN = ("--to", "supports[1].rotation[2]=-1.5")
+
+
+def test_follow_tells_of_branches_and_events(run, planar_file):
+    code, out, err = run("follow", planar_file, *TURN)
+    assert (code, err) == (0, "")
+    for words in ("supports[1].rotation[2]", "with the path", "fold", "-1.1231", "0 → 1", "26.344", "10.042"):
+        assert words in out
+    assert all(len(line) <= 80 for line in out.splitlines())
+
+
+def test_follow_without_events_says_so(run, planar_file):
+    code, out, _ = run("follow", planar_file, "--to", "supports[1].rotation[2] = 0.2")
+    assert code == 0
+    assert "no events" in out
+
+
+def test_follow_says_where_a_branch_ends_short_of_the_path(run, planar_file):
+    code, out, _ = run("follow", planar_file, *TURN, "--states", "10")
+    assert code == 0
+    assert "branch 0 has used up its states" in out
+
+
+def test_follow_writes_all_outputs_and_nothing_else(run, planar_file, turned):
+    code, _, _ = run("follow", planar_file, *TURN, "--out", "a.json", "--table", "a.csv", "--figure", "a.png")
+    assert code == 0
+    assert sorted(path.name for path in Path().iterdir()) == ["a.csv", "a.json", "a.png"]
+    tables = json.loads(Path("a.json").read_text("utf-8"))
+    assert tables["schema"] == "fishbone.diagram/1"
+    assert len(tables["branches"][0]["states"]) == len(turned.branches[0])
+    assert Path("a.png").read_bytes() == plot.encode(turned, ".png")
+
+
+def test_the_table_of_follow_holds_all_digits(run, planar_file, turned):
+    run("follow", planar_file, *TURN, "--table", "a.csv")
+    with Path("a.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    table = turned.table()
+    assert list(rows[0]) == list(table)
+    for name in ("parameter", "energy", "supports[1].moment.z", "rib_margin"):
+        assert [float(row[name]) for row in rows] == table[name].tolist()
+    assert [row["stable"] for row in rows] == [str(stable) for stable in table["stable"].tolist()]
+    assert [row["event"] for row in rows].count("fold") == 1
+
+
+def test_follow_prints_json_for_machines(run, planar_file, turned):
+    code, out, err = run("follow", planar_file, *TURN, "--json", "--out", "a.json")
+    assert (code, err) == (0, "")
+    assert out == Path("a.json").read_text("utf-8")
+    assert json.loads(out)["branches"][0]["events"][0]["parameter"] == turned.branches[0].events[0].parameter
+
+
+def test_follow_leads_several_numbers_a_list_or_poses(run, planar_file):
+    ends = (
+        ("--to", "supports[1].position[1]=0.7", "--to", "supports[1].position[2]=.1"),
+        ("--to", "supports[1].position=[0, 0.7, .1]"),
+        ("--pose", "0 0.7 0.1 0 0 0"),
+        ("--pose", "0, 0.7, 0.1, 0, 0, 0", "--support", "end", "--screw"),
+        ("--pose", "0 0.7 0.1 0 0 0", "--support", "-1"),
+        ("--pose", "0 0.7 0.1 0 0 0", "--support", "1.0"),
+    )
+    energies = []
+    for arguments in ends:
+        code, out, _ = run("follow", planar_file, *arguments, "--branches", "1", "--step", "0.1", "--json")
+        assert code == 0
+        energies.append(json.loads(out)["branches"][0]["states"][-1]["result"]["energy"])
+    assert energies == pytest.approx([energies[0]] * len(energies), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ((), "neither --to nor --pose"),
+        (("--to", "belt.width=0.2", "--pose", "0 0 0 0 0 0"), "--to and --pose"),
+        (("--to", "belt.width"), "FIELD=VALUE"),
+        (("--to", "=1"), "FIELD=VALUE"),
+        (("--to", "belt.width=wide"), "belt.width: found 'wide'"),
+        (("--to", "belt.width=[1"), "belt.width: found '[1'"),
+        (("--to", "belt.width=1,2"), "belt.width: found '1,2'"),
+        (("--to", "belt.width=nan"), "belt.width: found nan"),
+        (("--to", "belt.width=0.2", "--to", "belt.width=0.3"), "belt.width twice"),
+        (("--to", "belt.width=0.2", "--screw"), "--screw"),
+        (("--to", "belt.width=0.2", "--support", "end"), "--support"),
+        (("--to", "belt.colour=0.2"), "belt.colour: found nothing"),
+        (("--to", "belt.width=-1"), "at the end of the path, belt.width: found -1"),
+        (("--to", "belt.width=0.1"), "nothing that changes"),
+        (("--to", "belt.width=0.2", "--step", "0"), "step: found 0"),
+        (("--to", "belt.width=0.2", "--step", "far"), "far"),
+        (("--to", "belt.width=0.2", "--states", "1"), "states: found 1"),
+        (("--to", "belt.width=0.2", "--branches", "0"), "branches: found 0"),
+        (("--pose", "0 0.7 0 0 0"), "six numbers"),
+        (("--pose", "0 0.7 0 0 0 z"), "six numbers"),
+        (("--pose", "0 0.7 0 0 0 0", "--support", "middle"), "found 'middle'"),
+        (("--to", "belt.width=0.2", "--out", "a.txt"), "a.txt"),
+        (("--to", "belt.width=0.2", "--table", "a.json"), "a.json"),
+        (("--to", "belt.width=0.2", "--figure", "nowhere/a.png"), "nowhere"),
+    ],
+)
+def test_wrong_use_of_follow_is_exit_2_and_one_line_before_any_solve(run, monkeypatch, planar_file, arguments, said):
+    monkeypatch.setitem(fb.follow.__globals__, "solve", lambda _: pytest.fail("solved"))
+    code, out, err = run("follow", planar_file, *arguments)
+    assert (code, out) == (2, "")
+    assert_one_line(err, said)
+
+
+def test_a_support_that_is_not_there_is_exit_2(run, planar_file):
+    code, _, err = run("follow", planar_file, "--pose", "0 0.7 0 0 0 0", "--support", "0.5")
+    assert code == 2
+    assert_one_line(err, "support 0.5")
+
+
+def test_a_start_that_cannot_be_followed_is_exit_3_and_nothing_is_written(run, out_of_reach_file):
+    outputs = ("--out", "a.json", "--table", "a.csv", "--figure", "a.png")
+    code, out, err = run("follow", out_of_reach_file, *TURN, *outputs)
+    assert (code, out) == (3, "")
+    assert_one_line(err, out_of_reach_file, "nothing to follow")
+    assert list(Path().iterdir()) == []
+
+
+def test_follow_writes_nothing_where_a_picture_cannot_be_made(run, monkeypatch, planar_file):
+    def fail(*_):
+        raise fb.FishboneError("no picture")
+
+    monkeypatch.setattr(plot, "encode", fail)
+    code, _, err = run("follow", planar_file, *TURN, "--out", "a.json", "--table", "a.csv", "--figure", "a.png")
+    assert code == 2
+    assert_one_line(err, "no picture")
+    assert list(Path().iterdir()) == []
+
+
+def test_follow_does_not_overwrite_the_scenario(run, example):
+    Path("a.json").write_text(json.dumps(example.to_dict()), "utf-8")
+    code, _, err = run("follow", "a.json", *TURN, "--out", "a.json")
+    assert code == 2
+    assert_one_line(err, "a.json")
+
+
+def test_follow_misses_matplotlib_before_the_solve(run, monkeypatch, planar_file):
+    monkeypatch.delitem(sys.modules, "fishbone.plot", raising=False)
+    monkeypatch.delattr(fb, "plot", raising=False)
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    monkeypatch.setitem(fb.follow.__globals__, "solve", lambda _: pytest.fail("solved"))
+    code, _, err = run("follow", planar_file, *TURN, "--figure", "a.png")
+    assert code == 2
+    assert_one_line(err, "matplotlib", "pip install")
+
+
+def test_follow_shows_its_progress_on_a_terminal_only(run, monkeypatch, planar_file):
+    told = []
+    follow = fb.follow
+
+    def spy(*arguments, progress, **settings):
+        told.append(progress)
+        return follow(*arguments, progress=progress, **settings)
+
+    monkeypatch.setattr(fb, "follow", spy)
+    assert run("follow", planar_file, *TURN)[2] == ""
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    assert "branch 0" in run("follow", planar_file, *TURN)[2]
+    assert told[0] is None
+    assert told[1] is not None
+
+
+def test_control_c_ends_follow_with_exit_130_and_one_line(planar_file, tmp_path):
+    """The command as it is run, interrupted while the core is at work."""
+    code = (
+        "import signal, sys, threading, time\n"
+        "from fishbone import cli\n"
+        "threading.Timer(0.7, signal.raise_signal, [signal.SIGINT]).start()\n"
+        f"to = ['--to', 'supports[1].position[2]=0.6', '--step', '0.001', '--states', '100000', '--out', 'a.json']\n"
+        f"sys.exit(cli.main(['follow', {str(planar_file)!r}, *to]))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (130, "")
+    assert_one_line(done.stderr, "interrupted")
+    assert not list(tmp_path.iterdir())

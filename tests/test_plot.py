@@ -8,7 +8,8 @@ import pytest
 import trimesh
 
 import fishbone as fb
-from fishbone import examples, export, plot, scene
+from conftest import ROOT
+from fishbone import chart, examples, export, plot, scene
 
 
 def test_the_views_have_one_scale(equilibrium):
@@ -187,3 +188,106 @@ def test_a_view_along_the_upward_axis_is_refused(equilibrium):
     plot.oblique(equilibrium, (1.0, 1.0, 1.0))
     with pytest.raises(fb.InvalidArgument, match="viewer"):
         plot.oblique(equilibrium, (1.0, 0.0, 0.0))
+
+
+# --------------------------------------------------------------------------------------------------- the diagram
+
+
+@pytest.fixture(scope="module")
+def buckling():
+    """A straight strut under thrust: pitchforks, and branches that come off them."""
+    tables = examples_tables("planar")
+    tables["supports"][1]["position"] = [0.0, "free", 0.0]
+    tables["loads"] = {"points": [{"at": "end", "force": [0.0, -1.0, 0.0]}]}
+    return fb.follow(fb.Scenario.from_dict(tables), {"loads.points[0].force[1]": -90.0})
+
+
+def examples_tables(name):
+    return fb.load(ROOT / "scenarios" / f"{name}.toml").to_dict()
+
+
+def legend_of(figure):
+    return [text.get_text() for legend in figure.legends for text in legend.get_texts()]
+
+
+def lines_of(axes, style):
+    return [line.get_xydata() for line in axes.lines if line.get_linestyle() == style and len(line.get_xydata()) > 1]
+
+
+def test_a_diagram_shows_energy_height_and_force_over_the_parameter(turned):
+    figure = plot.diagram(turned)
+    [branch] = turned.branches
+    force = np.linalg.norm(branch.reaction("end").force, axis=1)
+    assert [axes.get_ylabel() for axes in figure.axes] == ["energy", "height [length]", "|force| of supports[1]"]
+    assert figure.axes[-1].get_xlabel() == turned.parameter_name
+    assert figure.get_figwidth() == 7.0
+    for axes, values in zip(figure.axes, (branch.energy, branch.height, force), strict=True):
+        [solid], [dashed] = lines_of(axes, "-"), lines_of(axes, "--")
+        points = np.column_stack([branch.parameter, values])
+        fold = branch.events[0].state
+        np.testing.assert_array_equal(solid, points[: fold + 1])
+        np.testing.assert_array_equal(dashed, points[fold:])
+
+
+def test_every_stretch_of_a_diagram_is_drawn_once_and_as_stable_as_it_is(buckling):
+    for branch in buckling.branches:
+        found = list(chart.runs(branch))
+        assert [states.start for states, _ in found] == [0, *(states.stop - 1 for states, _ in found[:-1])]
+        assert found[-1][0].stop == len(branch)
+        between = {event.state for event in branch.events}
+        for states, is_stable in found:
+            sure = [state for state in range(states.start, states.stop) if state not in between]
+            assert (branch.stable[sure] == is_stable).all()
+
+
+def test_branches_are_drawn_from_where_they_begin(buckling):
+    axes = plot.diagram(buckling).axes[1]
+    first = next(branch for branch in buckling.branches if branch.origin == fb.Origin(0, 0))
+    root = [line for line in lines_of(axes, "-") if len(line) == 2 and line[1][0] == first.parameter[0]]
+    [line] = root
+    assert line[0][0] == pytest.approx(buckling.branches[0].events[0].parameter, rel=1e-6)
+
+
+def test_the_key_of_a_diagram_names_what_it_has_and_nothing_else(turned, buckling):
+    assert legend_of(plot.diagram(turned)) == ["stable", "unstable", "fold", "snap"]
+    names = legend_of(plot.diagram(buckling))
+    assert {"stable", "unstable", "pitchfork", "branch 0", "branch 1"} <= set(names)
+    assert "transcritical" not in names
+    assert "bifurcation" not in names
+    steady = fb.follow(turned.start, {"supports[1].rotation[2]": 0.3}, branches=1)
+    assert legend_of(plot.diagram(steady)) == ["stable"]
+
+
+def test_snaps_of_a_diagram_lie_within_its_panels(turned):
+    figure = plot.diagram(turned)
+    [event] = turned.branches[0].events
+    low, high = figure.axes[0].get_ylim()
+    assert low < event.snapped.energy < high
+    [arrow] = figure.axes[0].texts
+    assert arrow.xy == (event.snapped_parameter, event.snapped.energy)
+
+
+def test_the_force_of_a_diagram_is_that_of_the_support_asked_for(turned):
+    axes = plot.diagram(turned, support="start").axes[-1]
+    assert axes.get_ylabel() == "|force| of supports[0]"
+    with pytest.raises(fb.NoSupport):
+        plot.diagram(turned, support=7)
+
+
+def test_a_diagram_of_a_belt_without_supports_has_no_force():
+    diagram = fb.follow(fb.load(ROOT / "scenarios" / "mobius.toml"), {"belt.width": 0.18}, branches=1)
+    assert [axes.get_ylabel() for axes in plot.diagram(diagram).axes] == ["energy", "height [length]"]
+
+
+@pytest.mark.parametrize("suffix", [".png", ".pdf"])
+def test_the_same_diagram_gives_the_same_file(turned, suffix):
+    again = fb.follow(turned.scenario, {"supports[1].rotation[2]": -1.5})
+    assert plot.encode(turned, suffix) == plot.encode(again, suffix)
+
+
+def test_a_diagram_is_saved_like_an_equilibrium(turned, tmp_path):
+    plot.save(turned, tmp_path / "diagram.svg")
+    assert b"<svg" in (tmp_path / "diagram.svg").read_bytes()
+    with pytest.raises(fb.InvalidArgument, match=r"found \.bmp, allowed \.png"):
+        plot.save(turned, tmp_path / "diagram.bmp")
+    assert [path.name for path in tmp_path.iterdir()] == ["diagram.svg"]

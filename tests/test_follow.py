@@ -1,0 +1,489 @@
+"""Equilibria along a path: events where independent references have them, energies that change as the reactions say."""
+
+from __future__ import annotations
+
+import json
+import math
+import signal
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+from scipy.linalg import expm, logm
+from scipy.spatial.transform import Rotation
+
+import fishbone as fb
+import planar
+from conftest import ROOT
+
+ANGLE = "supports[1].rotation[2]"
+PUSH = "loads.points[0].force[1]"
+
+
+def arch(distance: float = 0.6, angle: float = 0.0) -> fb.Scenario:
+    """The planar belt between clamps in line, its end turned."""
+    tables = fb.load(ROOT / "scenarios" / "planar.toml").to_dict()
+    tables["supports"][1] |= {"position": [0.0, distance, 0.0], "rotation": [0.0, 0.0, angle]}
+    return fb.Scenario.from_dict(tables)
+
+
+def strut() -> fb.Scenario:
+    """A straight belt under thrust, its end held square and free to slide along y."""
+    tables = arch().to_dict()
+    tables["supports"][1]["position"] = [0.0, "free", 0.0]
+    tables["loads"] = {"points": [{"at": "end", "force": [0.0, -1.0, 0.0]}]}
+    return fb.Scenario.from_dict(tables)
+
+
+def reference(distance: float, angle: float) -> planar.Planar:
+    start = planar.buckled(distance)
+    return planar.at_parameter(start, math.copysign(1.0, angle) * planar.TURN, abs(angle)) if angle else start
+
+
+@pytest.fixture(scope="module")
+def buckling() -> fb.Diagram:
+    return fb.follow(strut(), {PUSH: -100.0})
+
+
+@pytest.fixture(scope="module")
+def sheared() -> fb.Diagram:
+    """An arch whose end is moved aside: ribs lean, and it folds in plenty."""
+    return fb.follow(arch(), {"supports[1].position[2]": 0.25}, branches=1)
+
+
+# ------------------------------------------------------------------------------------------------------ events
+
+
+@pytest.mark.parametrize(
+    ("distance", "angle", "along", "field", "last"),
+    [
+        (0.6, 0.0, -planar.TURN, ANGLE, -1.5),
+        (0.8, 0.0, -planar.TURN, ANGLE, -1.5),
+        (0.9, 0.0, -planar.TURN, ANGLE, -1.5),
+        (0.6, -0.5, planar.ALONG_X, "supports[1].position[0]", 0.7),
+        (0.6, -0.5, -planar.ALONG_X, "supports[1].position[0]", -0.5),
+    ],
+)
+def test_fold_is_where_the_planar_reference_has_it(distance, angle, along, field, last):
+    expected = next(planar.folds(reference(distance, angle), along))
+    diagram = fb.follow(arch(distance, angle), {field: last}, branches=1)
+    fold = diagram.branches[0].events[0]
+    parameter = float(expected.pose @ np.abs(along))
+    assert (fold.kind, fold.negative_modes) == ("fold", (0, 1))
+    assert fold.parameter == pytest.approx(parameter, abs=1e-4)
+    assert diagram.branches[0].energy[fold.state] == pytest.approx(expected.state.energy, rel=1e-4)
+    assert diagram.branches[0].height[fold.state] == pytest.approx(expected.state.height, abs=1e-4)
+
+
+def test_arch_turned_back_folds_at_a_number_that_anyone_can_check(turned):
+    """Of the elastica: ϑ'' = X cos ϑ + Y sin ϑ from ϑ = 0 at the origin to ϑ = a at (0, 0.6)."""
+    assert turned.branches[0].events[0].parameter == pytest.approx(-1.1230897421, abs=1e-4)
+
+
+def test_flat_strut_buckles_at_eulers_loads(buckling):
+    first, second = buckling.branches[0].events
+    assert [first.kind, second.kind] == ["pitchfork", "pitchfork"]
+    assert [first.negative_modes, second.negative_modes] == [(0, 1), (1, 2)]
+    assert -first.parameter == pytest.approx(4.0 * math.pi**2, rel=1e-5)
+    assert -second.parameter == pytest.approx(80.7629142257, rel=1e-5)
+
+
+def test_buckled_branches_begin_at_eulers_loads_and_bend(buckling):
+    first = next(branch for branch in buckling.branches if branch.origin == fb.Origin(0, 0))
+    assert first.stable[0]
+    assert np.all(np.abs(buckling.branches[0].height) < 1e-9)
+    assert 0.05 < first.height[0] < first.height[2]
+    other = next(branch for branch in buckling.branches if branch.origin == fb.Origin(0, 1))
+    assert other.negative_modes[0] == 1
+
+
+def test_arch_pushed_aside_meets_the_s_where_the_planar_reference_has_it():
+    expected = planar.pitchfork(0.6)
+    event = fb.follow(arch(), {"supports[1].position[0]": 0.7}).branches[0].events[0]
+    assert event.parameter == pytest.approx(expected.pose[0], abs=1e-4)
+
+
+def test_events_lie_between_the_states_beside_them(turned, buckling):
+    for branch in [*turned.branches, *buckling.branches]:
+        states = [event.state for event in branch.events]
+        assert states == sorted(set(states))
+        for event in branch.events:
+            before, after = branch.negative_modes[[event.state - 1, event.state + 1]]
+            assert event.negative_modes == (before, after)
+            assert branch.parameter[event.state] == pytest.approx(event.parameter, abs=1e-3 * abs(event.parameter))
+
+
+def test_snapped_state_is_what_a_tracker_finds_past_the_fold(turned):
+    [fold] = turned.branches[0].events
+    tracker = fb.Tracker(arch())
+    for angle in np.linspace(0.0, fold.snapped_parameter, 200):
+        update = tracker.update([0.0, 0.6, 0.0], [0.0, 0.0, angle])
+    assert update.snapped
+    assert fold.snapped.status == "converged"
+    assert fold.snapped.energy == pytest.approx(update.energy, rel=1e-6)
+    np.testing.assert_allclose(fold.snapped.position, tracker.position, atol=1e-5)
+    assert fold.snapped.scenario.to_dict()["supports"][1]["rotation"][2] == pytest.approx(fold.snapped_parameter)
+    assert abs(fold.snapped_parameter) > abs(fold.parameter)
+
+
+# ------------------------------------------------------------------------------------------------------ states
+
+
+def rates_of(branch: fb.Branch, along: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rates along a branch, of its energy and of the work that `along` per unit of the parameter does; both by splines
+    over the length of the branch, folds and all, and away from its ends."""
+    keep = np.setdiff1d(np.arange(len(branch)), [event.state for event in branch.events])
+    parameter, energy, work = branch.parameter[keep], branch.energy[keep], along[keep]
+    way = np.linalg.norm(np.diff(branch.position[keep], axis=0), axis=2).max(axis=1) + np.abs(np.diff(parameter))
+    length = np.concatenate([[0.0], np.cumsum(way)])
+    rates = [CubicSpline(length, values)(length, 1) for values in (energy, parameter)]
+    return rates[0][3:-3], (work * rates[1])[3:-3]
+
+
+def test_energy_changes_by_the_moment_of_the_end_that_is_turned_through_the_fold():
+    [branch] = fb.follow(arch(), {ANGLE: -1.5}, step=0.02).branches
+    rate, work = rates_of(branch, branch.reaction("end").moment[:, 2])
+    assert branch.events
+    np.testing.assert_allclose(rate, work, atol=2e-3 * np.abs(rate).max())
+
+
+def test_energy_changes_by_the_force_of_the_end_that_is_moved_aside():
+    [branch] = fb.follow(arch(), {"supports[1].position[2]": 0.25}, step=0.02, branches=1).branches
+    rate, work = rates_of(branch, branch.reaction("end").force[:, 2])
+    np.testing.assert_allclose(rate, work, atol=1e-5 * np.abs(rate).max())
+
+
+def test_energy_changes_by_the_wrench_of_an_end_that_is_led_as_a_screw():
+    turn, shift = np.array([0.1, 0.3, -0.4]), np.array([0.05, 0.02, 0.03])
+    end = fb.Poses([(np.array([0.0, 0.6, 0.0]) + shift, turn)], motion="screw")
+    [branch] = fb.follow(arch(), end, step=0.02, branches=1).branches
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = Rotation.from_rotvec(turn).as_matrix(), shift
+    screw = np.real(logm(pose))
+    velocity = np.array([(expm(place * screw) @ screw)[:3, 3] for place in branch.parameter])
+    force, moment = branch.reaction("end")
+    rate, work = rates_of(branch, np.sum(force * velocity, axis=1) + moment @ turn)
+    np.testing.assert_allclose(rate, work, atol=1e-5 * np.abs(rate).max())
+
+
+def test_branch_is_stable_up_to_its_fold_and_unstable_beyond(turned):
+    [branch] = turned.branches
+    [fold] = branch.events
+    assert branch.stable[: fold.state].all()
+    assert not branch.stable[fold.state + 1 :].any()
+    assert branch.equilibrium(5).stable is True
+    assert branch.equilibrium(-5).stable is False
+    assert branch.equilibrium(-5).negative_modes == branch.negative_modes[-5] == 1
+
+
+def test_stable_states_are_those_of_a_solve(turned):
+    [branch] = turned.branches
+    for state in (0, 8, 16):
+        one, other = branch.equilibrium(state), fb.solve(branch.equilibrium(state).scenario)
+        assert one.energy == pytest.approx(other.energy, rel=1e-7)
+        np.testing.assert_allclose(one.position, other.position, atol=1e-5)
+
+
+def test_every_state_is_an_equilibrium(turned, sheared):
+    for branch in (*turned.branches, *sheared.branches):
+        for state in range(0, len(branch), 5):
+            equilibrium = branch.equilibrium(state)
+            assert equilibrium.status == "converged"
+            assert max(equilibrium.residuals) <= 1e-8
+
+
+def test_reports_are_those_of_the_equilibria(sheared):
+    [branch] = sheared.branches
+    for state in (0, len(branch) // 2, -1):
+        shape = branch.equilibrium(state)
+        assert branch.energy[state] == shape.energy
+        assert branch.height[state] == pytest.approx(shape.highest_point.position[0], rel=1e-12)
+        assert branch.least_bend_radius[state] == shape.least_bend_radius.value
+        assert branch.least_spine_radius[state] == shape.least_spine_radius.value
+        assert branch.rib_margin[state] == shape.rib_margin.value
+        np.testing.assert_array_equal(branch.position[state], shape.position)
+        for support in ("start", "end"):
+            for along, at in zip(branch.reaction(support), shape.reaction(support), strict=True):
+                np.testing.assert_array_equal(along[state], at)
+        assert shape.scenario.to_dict()["supports"][1]["position"][2] == branch.parameter[state]
+
+
+def test_arrays_have_the_documented_shapes_and_belong_to_the_caller(turned):
+    [branch] = turned.branches
+    count, nodes = len(branch), len(turned.start.u)
+    assert branch.position.shape == (count, nodes, 3)
+    assert branch.reaction("end").force.shape == branch.reaction(0).moment.shape == (count, 3)
+    assert branch.stable.dtype == np.bool_
+    assert branch.negative_modes.dtype == np.int64
+    for name in ("parameter", "energy", "height", "least_bend_radius", "least_spine_radius", "rib_margin"):
+        array = getattr(branch, name)
+        assert (array.shape, array.dtype) == ((count,), np.float64)
+        array[:] = math.nan
+        assert np.isfinite(getattr(branch, name)).all(), name
+    branch.position[:] = branch.negative_modes[:] = 7
+    assert branch.stable[0]
+    assert np.abs(branch.position).max() < 1.0
+
+
+def test_where_nothing_bends_no_radius_is_a_number():
+    # Not all flat belts are exactly flat: what is not NaN is very large.
+    radii = fb.follow(strut(), {PUSH: -2.0}, branches=1).branches[0].least_spine_radius
+    assert np.all(np.isnan(radii) | (radii > 1e9))
+
+
+# ------------------------------------------------------------------------------------------------------- paths
+
+
+def test_a_list_stands_for_its_numbers():
+    last = np.array([0.02, 0.65, 0.1])
+    one = fb.follow(arch(), {"supports[1].position": last}, branches=1)
+    other = fb.follow(arch(), {f"supports[1].position[{i}]": x for i, x in enumerate(last)}, branches=1)
+    assert one.parameter_name == other.parameter_name == "share of the path"
+    np.testing.assert_array_equal(one.branches[0].energy, other.branches[0].energy)
+    np.testing.assert_allclose(one.branches[0].equilibrium(-1).position[-1], last, atol=1e-7)
+
+
+def test_poses_on_a_line_are_the_numbers_that_change_on_it():
+    one = fb.follow(arch(), {"supports[1].position[2]": 0.2}, branches=1)
+    other = fb.follow(arch(), fb.Poses([([0.0, 0.6, 0.2], [0.0, 0.0, 0.0])]), branches=1)
+    assert (one.parameter_name, other.parameter_name) == ("supports[1].position[2]", "place on the path")
+    np.testing.assert_allclose(one.branches[0].parameter, 0.2 * other.branches[0].parameter, atol=1e-9)
+    np.testing.assert_allclose(one.branches[0].energy, other.branches[0].energy, rtol=1e-9)
+
+
+def test_a_support_is_led_through_pose_after_pose():
+    poses = [([0.0, 0.6, 0.1], [0.0, 0.2, 0.0]), ([0.0, 0.7, 0.1], [0.0, 0.0, 0.0])]
+    diagram = fb.follow(arch(), fb.Poses(poses), branches=1)
+    [branch] = diagram.branches
+    assert (branch.parameter[0], branch.parameter[-1], branch.end) == (0.0, 2.0, "range")
+    np.testing.assert_allclose(branch.position[-1, -1], poses[-1][0], atol=1e-7)
+    assert diagram.support == 1
+
+
+def test_a_screw_and_a_line_lead_to_one_end_by_different_ways():
+    poses = [([0.0, 0.7, 0.1], [0.0, 0.8, 0.0])]
+    line, screw = (
+        fb.follow(arch(), fb.Poses(poses, motion=motion), branches=1).branches[0] for motion in ("straight", "screw")
+    )
+    np.testing.assert_allclose(line.position[-1], screw.position[-1], atol=1e-5)
+    middle = [np.argmin(np.abs(branch.parameter - 0.5)) for branch in (line, screw)]
+    x = [branch.position[state, -1, 0] for branch, state in zip((line, screw), middle, strict=True)]
+    assert abs(x[0]) < 1e-9
+    assert abs(x[1]) > 1e-3
+
+
+def test_the_start_may_be_led_too():
+    diagram = fb.follow(arch(), fb.Poses([([0.0, 0.0, 0.1], [0.0, 0.0, 0.0])], support="start"), branches=1)
+    assert diagram.support == 0
+    np.testing.assert_allclose(diagram.branches[0].position[-1, 0], [0.0, 0.0, 0.1], atol=1e-7)
+
+
+def test_an_equilibrium_is_followed_itself(turned):
+    [branch] = fb.follow(turned.start, {ANGLE: -1.5}).branches
+    np.testing.assert_array_equal(branch.energy, turned.branches[0].energy)
+
+
+def test_a_saddle_is_followed_back_over_the_fold(turned):
+    saddle = turned.branches[0].equilibrium(-8)
+    branch = fb.follow(saddle, {ANGLE: -1.5}).branches[0]
+    assert branch.events[0].parameter == pytest.approx(turned.branches[0].events[0].parameter, abs=1e-6)
+    assert branch.events[0].negative_modes == (1, 0)
+    assert branch.events[0].snapped is None
+
+
+def test_a_belt_without_supports_is_followed():
+    diagram = fb.follow(fb.load(ROOT / "scenarios" / "mobius.toml"), {"belt.width": 0.15}, branches=1)
+    assert diagram.branches[0].end == "range"
+    assert diagram.support is None
+    assert not [name for name in diagram.table() if name.startswith("supports")]
+
+
+def test_a_branch_says_why_it_ends():
+    short = fb.follow(arch(), {ANGLE: -1.5}, states=10).branches[0]
+    assert (len(short), short.end) == (10, "budget")
+    assert fb.follow(arch(), {ANGLE: -0.5}).branches[0].end == "range"
+
+
+def test_shorter_steps_are_more_states_of_one_branch(turned):
+    fine = fb.follow(arch(), {ANGLE: -1.5}, step=0.01).branches[0]
+    assert len(fine) > 2 * len(turned.branches[0])
+    assert fine.events[0].parameter == pytest.approx(turned.branches[0].events[0].parameter, abs=1e-7)
+
+
+def test_the_same_twice_is_the_same_bit_for_bit(buckling):
+    again = fb.follow(strut(), {PUSH: -100.0})
+    assert dumped(again) == dumped(buckling)
+    for one, other in zip(again.table().values(), buckling.table().values(), strict=True):
+        assert one.tobytes() == other.tobytes()
+
+
+def dumped(diagram: fb.Diagram) -> str:
+    """All but the times."""
+
+    def untimed(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {key: untimed(item) for key, item in value.items() if key != "solve_time"}
+        return [untimed(item) for item in value] if isinstance(value, list) else value
+
+    return json.dumps(untimed(diagram.to_dict()))
+
+
+# ----------------------------------------------------------------------------------------------------- exports
+
+
+def test_the_dict_says_what_the_branches_say(turned):
+    tables = turned.to_dict()
+    assert json.loads(json.dumps(tables, allow_nan=False)) == tables
+    assert tables["schema"] == "fishbone.diagram/1"
+    assert tables["parameter_name"] == ANGLE
+    assert tables["scenario"] == arch().to_dict()
+    [branch], [expected] = tables["branches"], turned.branches
+    assert (branch["origin"], branch["end"]) == (None, "range")
+    [event], [fold] = branch["events"], expected.events
+    assert event["kind"] == "fold"
+    assert event["negative_modes"] == [0, 1]
+    assert event["parameter"] == fold.parameter
+    assert event["snapped"]["parameter"] == fold.snapped_parameter
+    assert event["snapped"]["result"]["energy"] == fold.snapped.energy
+    assert [state["parameter"] for state in branch["states"]] == expected.parameter.tolist()
+    assert [state["negative_modes"] for state in branch["states"]] == expected.negative_modes.tolist()
+    assert [state["result"]["energy"] for state in branch["states"]] == expected.energy.tolist()
+    assert {state["result"]["schema"] for state in branch["states"]} == {"fishbone.result/1"}
+
+
+def test_the_dict_says_where_branches_begin(buckling):
+    origins = [branch["origin"] for branch in buckling.to_dict()["branches"]]
+    assert origins[:2] == [None, {"branch": 0, "event": 0}]
+
+
+def test_the_table_has_a_row_for_each_state_of_all_branches(buckling):
+    table = buckling.table()
+    count = sum(map(len, buckling.branches))
+    assert {column.shape for column in table.values()} == {(count,)}
+    for index, branch in enumerate(buckling.branches):
+        rows = table["branch"] == index
+        np.testing.assert_array_equal(table["state"][rows], np.arange(len(branch)))
+        np.testing.assert_array_equal(table["energy"][rows], branch.energy)
+        np.testing.assert_array_equal(table["stable"][rows], branch.stable)
+        np.testing.assert_array_equal(table["supports[1].force.x"][rows], branch.reaction(1).force[:, 0])
+        np.testing.assert_array_equal(table["supports[0].moment.z"][rows], branch.reaction(0).moment[:, 2])
+    assert np.count_nonzero(table["event"]) == sum(len(branch.events) for branch in buckling.branches)
+
+
+def test_repr_is_one_short_line(turned):
+    assert repr(turned) == f"<Diagram: {ANGLE}, 1 branches, {len(turned.branches[0])} states, 1 events>"
+    assert repr(turned.branches[0]).startswith("<Branch: ")
+
+
+# ------------------------------------------------------------------------------------------------------ errors
+
+
+@pytest.mark.parametrize(
+    ("path", "error", "said"),
+    [
+        ({}, fb.NoPath, "found nothing that changes"),
+        ({"supports[1].position[1]": 0.6}, fb.NoPath, "found nothing that changes"),
+        ({"supports[7].position[1]": 0.6}, fb.NoPath, r"supports\[7\].position\[1\]: found nothing"),
+        ({"supports[1].position": 0.6}, fb.NoPath, r"supports\[1\].position: found \[0.0,0.6,0.0\]"),
+        ({"supports[1].position": [0, 0.6, 0, 1]}, fb.NoPath, r"position\[3\]: found nothing"),
+        ({"energy": 1.0}, fb.NoPath, 'energy: found "wunderlich"'),
+        ({"belt.width": -1.0}, fb.NoPath, "at the end of the path, belt.width: found -1"),
+        ({"belt.width": math.nan}, fb.InvalidArgument, "belt.width: found nan"),
+        ({"belt.width": 10**400}, fb.InvalidArgument, "belt.width: found 1000"),
+        ({"belt.width": True}, fb.InvalidArgument, "belt.width: found True"),
+        ({"belt.width": "wide"}, fb.InvalidArgument, "belt.width: found 'wide'"),
+        ({1: 2.0}, fb.InvalidArgument, "found the field 1"),
+        ({"supports[1].position[1]": 0.7, "supports[1].position": [0, 0.7]}, fb.InvalidArgument, "found twice"),
+        ([("belt.width", 0.2)], fb.InvalidArgument, "path: found list"),
+        (fb.Poses([]), fb.NoPath, "found nothing that changes"),
+        (fb.Poses([([0.0, 0.6, 0.0], [0.0, 0.0, 0.0])]), fb.NoPath, "found nothing that changes"),
+        (fb.Poses([([0.0, 0.6], [0.0, 0.0, 0.0])]), fb.InvalidArgument, r"poses\[0\]\[0\]: found shape \(2,\)"),
+        (fb.Poses([([0.0, 0.6, 0.0],)]), fb.InvalidArgument, r"poses\[0\]: found"),
+        (fb.Poses(1.0), fb.InvalidArgument, "poses: found 1.0"),
+        (fb.Poses([([0.0, 0.7, 0.0], [0.0, 0.0, 0.0])], motion="arc"), fb.InvalidArgument, "motion: found 'arc'"),
+        (fb.Poses([([0.0, 0.7, 0.0], [0.0, 0.0, 0.0])], support=4), fb.NoSupport, "support 4"),
+    ],
+)
+def test_what_is_no_path_is_refused_in_one_line(path, error, said):
+    with pytest.raises(error, match=said) as refusal:
+        fb.follow(arch(), path)
+    assert "\n" not in str(refusal.value)
+    assert isinstance(refusal.value, fb.FishboneError)
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("step", [0.0, -0.1, 1.5, math.nan, "a", True]),
+        ("states", [1, 100_001, 2.5, True]),
+        ("branches", [0, 1001, "a"]),
+    ],
+)
+def test_settings_are_within_their_limits(monkeypatch, name, values):
+    monkeypatch.setitem(fb.follow.__globals__, "solve", lambda _: pytest.fail("solved"))
+    for value in values:
+        with pytest.raises(fb.InvalidArgument, match=f"^{name}: found .*, allowed"):
+            fb.follow(arch(), {ANGLE: -1.5}, **{name: value})
+
+
+def test_follow_says_what_it_needs():
+    with pytest.raises(fb.InvalidArgument, match="found str, allowed a Scenario or an Equilibrium"):
+        fb.follow("planar.toml", {ANGLE: -1.5})
+
+
+def test_what_cannot_be_followed_is_refused(out_of_reach):
+    with pytest.raises(fb.NoBranch, match="nothing to follow"):
+        fb.follow(out_of_reach, {ANGLE: -1.5})
+    ritz = fb.Scenario.from_dict(arch().to_dict() | {"energy": "fishbone", "solver": {"method": "ritz"}})
+    with pytest.raises(fb.NoBranch, match="source's method"):
+        fb.follow(ritz, {ANGLE: -1.5})
+    pinned = arch().to_dict()
+    del pinned["supports"][1]["rotation"]
+    with pytest.raises(fb.NoPath, match=r"supports\[1\]: found a support that does not hold"):
+        fb.follow(fb.Scenario.from_dict(pinned), fb.Poses([([0.0, 0.7, 0.0], [0.0, 0.0, 0.0])]))
+
+
+def test_what_is_not_there_is_refused(turned):
+    [branch] = turned.branches
+    for state in (len(branch), -len(branch) - 1, 1.5, True):
+        with pytest.raises(fb.InvalidArgument, match=f"state: found {state}, allowed"):
+            branch.equilibrium(state)
+    with pytest.raises(fb.NoSupport):
+        branch.reaction(2)
+
+
+def test_progress_is_told_and_may_end_it():
+    told = []
+    fb.follow(strut(), {PUSH: -100.0}, progress=lambda branch, share: told.append((branch, share)))
+    assert {branch for branch, _ in told} <= set(range(10))
+    assert all(-0.1 <= share <= 1.1 for _, share in told)
+    assert told
+
+    for error in (ValueError("enough"), KeyboardInterrupt()):
+
+        def stop(branch, share, error=error):
+            raise error
+
+        with pytest.raises(type(error)) as ended:
+            fb.follow(strut(), {PUSH: -100.0}, progress=stop)
+        assert ended.value is error
+
+
+class _Alarm(Exception):  # noqa: N818
+    pass
+
+
+def test_a_signal_ends_it():
+    def ring(*_):
+        raise _Alarm
+
+    start = fb.solve(fb.Scenario.from_dict(arch().to_dict() | {"solver": {"elements": 640}}))
+    before = signal.signal(signal.SIGALRM, ring)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.05)
+        with pytest.raises(_Alarm):
+            fb.follow(start, {"supports[1].position[2]": 0.6})
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
