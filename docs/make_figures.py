@@ -1,7 +1,7 @@
 """Makes every picture of README.md and docs: `make figures`.
 
 Whatever is shown is computed here by the package, save the shell (tests/data/shell) and what the source prints. Grey
-levels, line styles and markers alone tell things apart.
+levels, line styles and markers alone tell things apart; where there are colours they are as good in grey.
 """
 
 from __future__ import annotations
@@ -235,6 +235,17 @@ def bend_radius() -> Figure:
     return figure
 
 
+# ------------------------------------------------------------------------------------------------------ continuation
+
+
+def continuation() -> Figure:
+    """A strut under thrust, its far end held square and sliding: how it buckles, and what branches off."""
+    tables = fb.load(ROOT / "scenarios" / "planar.toml").to_dict() | {"name": "A strut under thrust"}
+    tables["supports"][1]["position"] = [0.0, "free", 0.0]
+    tables["loads"] = {"points": [{"at": "end", "force": [0.0, -1.0, 0.0]}]}
+    return plot.diagram(fb.follow(fb.Scenario.from_dict(tables), {"loads.points[0].force[1]": -100.0}))
+
+
 # ------------------------------------------------------------------------------------------------------------- shell
 
 
@@ -299,7 +310,7 @@ def main() -> None:
     for name in GALLERY:
         with mpl.rc_context(STYLE | {"axes.grid": False, "savefig.dpi": 150.0}):
             save(gallery(name), f"gallery_{name}")
-    for draw in (examples, convergence, bound, bend_radius, shell_thickness, collocation, locking):
+    for draw in (examples, convergence, bound, bend_radius, continuation, shell_thickness, collocation, locking):
         with mpl.rc_context(STYLE):
             save(draw(), draw.__name__)
 

@@ -94,11 +94,13 @@ def draw(axes: Axes, diagram: Diagram, panel: Panel) -> bool:
     axes.set(ylabel=panel.label)
     axes.grid(visible=True, color="0.9", linewidth=0.5)
     snaps = list(_snaps(diagram, panel, curves))
-    for _, end in snaps:
-        axes.plot(*end, **LANDED)
+    if snaps:
+        axes.update_datalim([end for _, end in snaps])
+        axes.autoscale_view()
     shortest = SHORTEST_SNAP * np.ptp(axes.get_ylim())
     seen = [(start, end) for start, end in snaps if abs(end[1] - start[1]) > shortest]
     for start, end in seen:
+        axes.plot(*end, **LANDED)
         axes.annotate("", end, start, arrowprops=SNAP)
     return bool(seen)
 
