@@ -257,11 +257,13 @@ impl Search<'_, '_> {
             events: Vec::new(),
             end,
         });
+        /// As near to where a branch is its own mirror image a push off it begins.
+        const BEFORE: f64 = 5e-3;
         for (state, event) in events {
             if end == End::Interrupted {
                 return;
             }
-            let crossing = self.crossing(&event);
+            let crossing = self.crossing(&event, before_by(BEFORE, &event, &stations[..state]));
             let onwards = (event.parameter - stations[state - 1].parameter).signum();
             let snapped = match event.negative {
                 [0, _] => self.snapped(&event, &crossing, onwards),
@@ -280,11 +282,14 @@ impl Search<'_, '_> {
                 snapped,
             });
             for side in self.different(crossing) {
-                let is_known = self.diagram.passes_through(&side, index);
-                if !is_known && self.diagram.branches.len() < self.diagram.settings.branches {
-                    let away = self.away(&side, event.parameter);
-                    if let Some(away) = away {
-                        self.trace(Some(origin), away);
+                let is_known = self.diagram.passes_through(&side);
+                if is_known || self.diagram.branches.len() >= self.diagram.settings.branches {
+                    continue;
+                }
+                for rising in self.ways(&event, &side) {
+                    let start = self.continuation.start(&side.at, side.parameter, rising);
+                    if let Some(start) = start {
+                        self.trace(Some(origin), start);
                     }
                 }
             }
@@ -294,12 +299,30 @@ impl Search<'_, '_> {
     /// The stations of other branches that cross at an event, a little before it or beyond.
     ///
     /// From beside the event a push along the mode that is about to vanish leads over to them.
-    fn crossing(&mut self, event: &solver::Event<BeltPoint>) -> Vec<Station<BeltPoint>> {
+    fn crossing(
+        &mut self,
+        event: &solver::Event<BeltPoint>,
+        before: &Station<BeltPoint>,
+    ) -> Vec<Station<BeltPoint>> {
         const BESIDE: [f64; 3] = [2e-3, 5e-4, 1e-2];
         /// Farther off it is none that crosses there.
         const NEAR: f64 = 0.2;
-        if event.turn == Turn::Fold {
-            return Vec::new();
+        let branch = self.diagram.branches.len();
+        let proceed = &mut |_| (self.proceed)(branch, event.parameter);
+        match event.turn {
+            Turn::Fold => return Vec::new(),
+            // A push off the branch, where it has not come close yet, leads to the one that it crosses.
+            Turn::Apex => {
+                let others = self.continuation.others(before, &event.mode, proceed);
+                let is_other = |other: &Station<BeltPoint>| other.negative != before.negative;
+                return others
+                    .into_iter()
+                    .flatten()
+                    .flatten()
+                    .filter(is_other)
+                    .collect();
+            }
+            Turn::Bifurcation => (),
         }
         for by in BESIDE {
             let mut found = Vec::new();
@@ -307,7 +330,7 @@ impl Search<'_, '_> {
                 let Some(beside) = self.continuation.beside(event, by) else {
                     continue;
                 };
-                let proceed = &mut |_| (self.proceed)(self.diagram.branches.len(), event.parameter);
+                let proceed = &mut |_| (self.proceed)(branch, event.parameter);
                 let others = self.continuation.others(&beside, &event.mode, proceed);
                 let near =
                     |other: &Station<BeltPoint>| other.at.point.distance(&beside.at.point) < NEAR;
@@ -320,11 +343,14 @@ impl Search<'_, '_> {
         Vec::new()
     }
 
-    /// The same station, the branch heading away from where it crosses another.
-    fn away(&self, station: &Station<BeltPoint>, place: f64) -> Option<Station<BeltPoint>> {
-        let rising = station.parameter > place;
-        self.continuation
-            .start(&station.at, station.parameter, rising)
+    /// Which ways to follow a branch from a station beside an event: away from where it crosses, or both where it is the one
+    /// that goes straight through.
+    fn ways(&self, event: &solver::Event<BeltPoint>, side: &Station<BeltPoint>) -> Vec<bool> {
+        let away = side.parameter > event.parameter;
+        match event.turn {
+            Turn::Apex => vec![true, false],
+            Turn::Fold | Turn::Bifurcation => vec![away],
+        }
     }
 
     /// Of two that are mirror images the one that bulges as the scenario asks; else all.
@@ -375,11 +401,27 @@ impl Search<'_, '_> {
     }
 }
 
+/// The last station at least so far before an event, else the first.
+fn before_by<'a>(
+    far: f64,
+    event: &solver::Event<BeltPoint>,
+    stations: &'a [Station<BeltPoint>],
+) -> &'a Station<BeltPoint> {
+    let is_before =
+        |station: &&Station<BeltPoint>| (station.parameter - event.parameter).abs() >= far;
+    stations
+        .iter()
+        .rev()
+        .find(is_before)
+        .unwrap_or(&stations[0])
+}
+
 /// What an event is, by where the other branches are.
 fn kind(event: &solver::Event<BeltPoint>, crossing: &[Station<BeltPoint>]) -> Kind {
     let beyond = |station: &&Station<BeltPoint>| station.parameter > event.parameter;
     match (event.turn, crossing.iter().filter(beyond).count()) {
         (Turn::Fold, _) => Kind::Fold,
+        (Turn::Apex, _) => Kind::Pitchfork,
         (Turn::Bifurcation, _) if crossing.is_empty() => Kind::Bifurcation,
         (Turn::Bifurcation, 1) if crossing.len() == 2 => Kind::Transcritical,
         (Turn::Bifurcation, _) => Kind::Pitchfork,
@@ -447,27 +489,38 @@ impl Diagram {
         }
     }
 
-    /// Whether a branch other than one that is excepted passes through a station.
-    fn passes_through(&self, station: &Station<BeltPoint>, except: usize) -> bool {
-        let near = 0.6 * self.settings.step;
-        let is_near = |state: &State| {
-            let same_place = (state.place - station.parameter).abs() < near;
-            let way =
-                |(a, b): (&crate::lie::Pose, &crate::lie::Pose)| (a.position - b.position).norm();
-            let ways = state
-                .at
-                .point
-                .poses
-                .iter()
-                .zip(&station.at.point.poses)
-                .map(way);
-            same_place && ways.fold(0.0, f64::max) < near
-        };
-        let others = self
-            .branches
+    /// Whether a branch passes through a station, as far as its states tell by straight lines between them.
+    fn passes_through(&self, station: &Station<BeltPoint>) -> bool {
+        self.branches.iter().any(|branch| {
+            let pairs = branch.states.windows(2);
+            pairs
+                .map(|pair| [&pair[0], &pair[1]])
+                .any(|pair| lies_between(station, pair))
+        })
+    }
+}
+
+/// Whether a station lies between two states of a branch.
+fn lies_between(station: &Station<BeltPoint>, [a, b]: [&State; 2]) -> bool {
+    const NEAR: f64 = 2e-3;
+    const SAG: f64 = 0.05;
+    let share = (station.parameter - a.place) / (b.place - a.place);
+    let point = |state: &State| {
+        state
+            .at
+            .point
+            .poses
             .iter()
-            .enumerate()
-            .filter(|(index, _)| *index != except);
-        others.flat_map(|(_, branch)| &branch.states).any(is_near)
+            .map(|pose| pose.position)
+            .collect::<Vec<_>>()
+    };
+    (0.0..=1.0).contains(&share) && {
+        let between = point(a)
+            .into_iter()
+            .zip(point(b))
+            .zip(&station.at.point.poses);
+        let off = between.map(|((a, b), pose)| (pose.position - a.lerp(&b, share)).norm());
+        let sag = SAG * a.at.point.distance(&b.at.point);
+        off.fold(0.0, f64::max) < NEAR + sag
     }
 }

@@ -8,11 +8,9 @@
 
 use super::chain::NodeVector;
 use super::kkt::KktVector;
-use super::modes::lowest_modes_of;
+use super::modes::{lowest_modes_of, moved};
 use super::push::pushed_over;
-use super::{
-    BOUNDS, Kkt, Program, Residuals, Rows, Settings, Stationary, Values, assess, minimise,
-};
+use super::{Kkt, Program, Residuals, Rows, Settings, Shape, Stationary, assess, minimise};
 use super::{Mode, Solution};
 use std::ops::ControlFlow;
 
@@ -58,6 +56,8 @@ pub enum Turn {
     Fold,
     /// Another curve crosses, or several.
     Bifurcation,
+    /// The parameter turns back where another curve crosses, and this one is its own mirror image.
+    Apex,
 }
 
 /// A place on a curve where the second variation is singular.
@@ -80,7 +80,7 @@ pub struct Event<X> {
 pub enum End {
     /// The parameter has left its range.
     Range,
-    /// At its first event, as asked.
+    /// At an event: the first, as asked, or one beyond which it would be its own mirror image.
     Event,
     /// The curve has come back to where it began.
     Closed,
@@ -138,7 +138,10 @@ type PointOf<F> = <<F as Family>::Program as Program>::Point;
 /// A shorter step is none.
 const SHORTEST: f64 = 1e-7;
 
-impl<'a, F: Family> Continuation<'a, F> {
+impl<'a, F: Family> Continuation<'a, F>
+where
+    PointOf<F>: Shape,
+{
     /// Over a range of the parameter.
     pub fn new(family: &'a F, tolerance: f64, range: [f64; 2], pace: Pace) -> Self {
         Self {
@@ -189,9 +192,10 @@ impl<'a, F: Family> Continuation<'a, F> {
                 break;
             };
             if let Some(event) = step.event {
+                let is_last = self.pace.events == Events::EndAtFirst || event.turn == Turn::Apex;
                 curve.stations.push(event.station.clone());
                 curve.events.push((curve.stations.len() - 1, event));
-                if self.pace.events == Events::EndAtFirst {
+                if is_last {
                     curve.end = End::Event;
                     break;
                 }
@@ -272,9 +276,11 @@ impl<'a, F: Family> Continuation<'a, F> {
         };
         let program = self.family.at(parameter)?;
         let mut found = minimise(&program, &settings, from.at.point.clone(), proceed);
-        if !found.is_minimum() {
-            let mut off = found.at.point.clone();
-            program.retract(&found.at.point, &mode.motion, OFF, &mut off);
+        for off in [OFF, -OFF, 10.0 * OFF] {
+            if found.is_minimum() {
+                break;
+            }
+            let off = moved(&program, &from.at.point, mode, off);
             found = minimise(&program, &settings, off, proceed);
         }
         found.is_minimum().then_some(found)
@@ -290,7 +296,8 @@ impl<'a, F: Family> Continuation<'a, F> {
             let shortest = *length < 2.0 * SHORTEST;
             let taken = step.filter(|next| {
                 let straight = last.cosine(next) > SHARPEST;
-                let apart = self.pace.events == Events::Ignore || last.turns_before(next).is_some();
+                let apart = self.pace.events == Events::Ignore
+                    || last.negative.abs_diff(next.negative) <= 1;
                 shortest || (straight && apart)
             });
             let Some(next) = taken else {
@@ -333,7 +340,13 @@ impl<'a, F: Family> Continuation<'a, F> {
         parameter: f64,
     ) -> Option<Station<PointOf<F>>> {
         let share = (parameter - from.parameter) / (to.parameter - from.parameter);
-        let nearer = if share < 0.5 { from } else { to };
+        // A curve that begins there goes on to another such station.
+        let begins_there = from.parameter == parameter;
+        let nearer = if share < 0.5 && !begins_there {
+            from
+        } else {
+            to
+        };
         let mut at = nearer.at.clone();
         let arrival = self.correct(&mut at, parameter, None)?;
         self.station(at, arrival, Some(&to.tangent))
@@ -352,12 +365,14 @@ impl<'a, F: Family> Continuation<'a, F> {
         const ITERATIONS: usize = 30;
         /// As close in the parameter as is worth while.
         const CLOSE: f64 = 1e-9;
-        let turn = from.turns_before(to).unwrap_or(Some(Turn::Bifurcation))?;
+        /// Where the last steps lead no nearer than this, what is sought need not be smooth in between.
+        const SHARP: f64 = 1e-5;
+        let turn = from.turn_before(to)?;
         let crossing = from.negative.min(to.negative) + 1;
         // What changes its sign.
         let place = |length: f64, station: Station<PointOf<F>>| {
             let value = match turn {
-                Turn::Fold => station.tangent.parameter,
+                Turn::Fold | Turn::Apex => station.tangent.parameter,
                 Turn::Bifurcation => {
                     self.modes(&station, crossing)?
                         .get(crossing - 1)?
@@ -377,7 +392,9 @@ impl<'a, F: Family> Continuation<'a, F> {
             let (a, b) = (weights[0] * low.value, weights[1] * high.value);
             let next = low.length - a * (high.length - low.length) / (b - a);
             let is_close = match turn {
-                Turn::Fold => low.value.abs().min(high.value.abs()) * (high.length - low.length),
+                Turn::Fold | Turn::Apex => {
+                    low.value.abs().min(high.value.abs()) * (high.length - low.length)
+                }
                 Turn::Bifurcation => (high.station.parameter - low.station.parameter).abs(),
             };
             if is_close < CLOSE {
@@ -405,9 +422,10 @@ impl<'a, F: Family> Continuation<'a, F> {
         let share = low.value / (low.value - high.value);
         let [a, b] = [&low, &high].map(|place| place.station.parameter);
         let nearest = if share < 0.5 { low } else { high };
+        let is_sharp = (b - a).abs() < SHARP;
         let parameter = match turn {
-            Turn::Fold => nearest.station.parameter,
-            Turn::Bifurcation => a + share * (b - a),
+            Turn::Bifurcation if is_sharp => a + share * (b - a),
+            _ => nearest.station.parameter,
         };
         let mode = self.modes(&nearest.station, crossing)?;
         let mode = mode.into_iter().nth(crossing - 1)?;
@@ -486,7 +504,7 @@ impl<'a, F: Family> Continuation<'a, F> {
             let drift = |stage: usize, bound: usize| {
                 moved * drift.as_ref().map_or(0.0, |by| by.bounds[stage][bound])
             };
-            let taken = move_along(&program, at, &step, drift)?;
+            let taken = move_along(&program, &kkt, at, &step, drift);
             parameter += taken * moved;
             left *= 1.0 - taken;
         }
@@ -577,7 +595,10 @@ pub fn settle<P: Program>(
     program: &P,
     tolerance: f64,
     mut near: Stationary<P::Point>,
-) -> Option<Solution<P::Point>> {
+) -> Option<Solution<P::Point>>
+where
+    P::Point: Shape,
+{
     let pace = Pace {
         longest: 1.0,
         stations: 1,
@@ -616,18 +637,14 @@ impl<X> Station<X> {
         self.tangent.dot(&other.tangent)
     }
 
-    /// What happens on the way to the next station; `None` where it is more than one thing.
-    #[expect(
-        clippy::option_option,
-        reason = "nothing happens, or it cannot be told what"
-    )]
-    fn turns_before(&self, next: &Self) -> Option<Option<Turn>> {
-        let folds = (self.tangent.parameter < 0.0) != (next.tangent.parameter < 0.0);
-        match (folds, self.negative.abs_diff(next.negative)) {
-            (false, 0) => Some(None),
-            (true, 1) => Some(Some(Turn::Fold)),
-            (false, 1) => Some(Some(Turn::Bifurcation)),
-            _ => None,
+    /// What happens on the way to the next station, if anything does.
+    fn turn_before(&self, next: &Self) -> Option<Turn> {
+        let turns_back = (self.tangent.parameter < 0.0) != (next.tangent.parameter < 0.0);
+        match (turns_back, self.negative.abs_diff(next.negative)) {
+            (false, 0) => None,
+            (true, 0) => Some(Turn::Apex),
+            (true, 1) => Some(Turn::Fold),
+            _ => Some(Turn::Bifurcation),
         }
     }
 }
@@ -652,29 +669,16 @@ impl Tangent {
 /// that was. `drift` is what the programme's own change adds to a slack along the whole step.
 fn move_along<P: Program>(
     program: &P,
+    kkt: &Kkt,
     at: &mut Stationary<P::Point>,
     step: &KktVector,
     drift: impl Fn(usize, usize) -> f64,
-) -> Option<f64> {
+) -> f64 {
     const KEEP: f64 = 0.995;
-    let mut values = Values::default();
-    if !program.evaluate(&mut at.point, &mut values) {
-        return None;
-    }
-    let mut linear = super::Linearisation::new(program);
-    program.linearise(
-        &at.point,
-        &at.multipliers,
-        &at.bound_multipliers,
-        &mut linear,
-    );
     let (mut primal, mut dual) = (1.0, 1.0);
-    for (k, slacks) in values.slacks.iter().enumerate() {
+    for (k, slacks) in kkt.values().slacks.iter().enumerate() {
         for (b, slack) in slacks.iter().enumerate().take(program.bounds()) {
-            let by = &linear.slacks[k][b];
-            let [first, second] = [k, k + 1].map(|node| &step.nodes[node]);
-            let rate = by[0] * first[6] + by[1] * first[7] + by[2] * second[6] + by[3] * second[7];
-            let rate = rate + drift(k, b);
+            let rate = kkt.slack_rate(k, b, &step.nodes) + drift(k, b);
             if rate * primal < -KEEP * slack {
                 primal = -KEEP * slack / rate;
             }
@@ -691,11 +695,11 @@ fn move_along<P: Program>(
         *rows += primal * step;
     }
     for (multipliers, steps) in at.bound_multipliers.iter_mut().zip(&step.bounds) {
-        for b in 0..BOUNDS {
-            multipliers[b] -= dual * steps[b];
+        for (multiplier, step) in multipliers.iter_mut().zip(steps) {
+            *multiplier -= dual * step;
         }
     }
-    Some(primal)
+    primal
 }
 
 fn dot(a: &[NodeVector], b: &[NodeVector]) -> f64 {

@@ -189,6 +189,13 @@ impl Kkt {
         }
     }
 
+    /// Change of a slack along a motion, to first order.
+    pub(super) fn slack_rate(&self, stage: usize, bound: usize, motion: &[NodeVector]) -> f64 {
+        let by = &self.linear.slacks[stage][bound];
+        let [first, second] = [stage, stage + 1].map(|node| &motion[node]);
+        by[0] * first[6] + by[1] * first[7] + by[2] * second[6] + by[3] * second[7]
+    }
+
     /// Values where the system was factorised.
     pub(super) fn values(&self) -> &Values {
         &self.values

@@ -2,7 +2,9 @@
 
 use super::chain::NodeVector;
 use super::continuation::{Continuation, End, Events, Family, Pace};
-use super::{Bounds, Kkt, Linearisation, Mode, Program, Rows, RowsByNode, Stationary, Values};
+use super::{
+    Bounds, Kkt, Linearisation, Mode, Program, Rows, RowsByNode, Shape, Stationary, Values,
+};
 use nalgebra::Matrix6;
 use std::ops::ControlFlow;
 
@@ -27,7 +29,10 @@ pub fn pushed_over<P: Program + Clone>(
     mode: &Mode,
     forth: bool,
     proceed: &mut dyn FnMut(f64) -> ControlFlow<()>,
-) -> Option<Stationary<P::Point>> {
+) -> Option<Stationary<P::Point>>
+where
+    P::Point: Shape,
+{
     const PACE: Pace = Pace {
         longest: 0.05,
         stations: 80,
