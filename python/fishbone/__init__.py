@@ -21,7 +21,7 @@ from fishbone.equilibrium import (
     Reaction,
     Residuals,
     RibMargin,
-    SpineRadius,
+    SnapMargin,
     solve,
     solve_many,
 )

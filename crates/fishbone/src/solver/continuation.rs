@@ -10,7 +10,7 @@ use super::chain::NodeVector;
 use super::kkt::KktVector;
 use super::modes::{lowest_modes_of, moved};
 use super::push::pushed_over;
-use super::{Kkt, Program, Residuals, Rows, Settings, Shape, Stationary, assess, minimise};
+use super::{BOUNDS, Kkt, Program, Residuals, Rows, Settings, Shape, Stationary, assess, minimise};
 use super::{Mode, Solution};
 use std::ops::ControlFlow;
 
@@ -187,7 +187,8 @@ where
                 curve.end = End::Interrupted;
                 break;
             }
-            let Some(step) = self.advance(last, &mut length) else {
+            let step = self.advance(last, &mut length);
+            let Some(step) = step.or_else(|| self.hop(last, &mut length)) else {
                 curve.end = End::Lost;
                 break;
             };
@@ -330,6 +331,32 @@ where
                 arrived: false,
             });
         }
+    }
+
+    /// The station a little way on in the parameter, where no step along the curve leads on: across a kink, where an inequality
+    /// is taken up or given up at once.
+    fn hop(&self, last: &Station<PointOf<F>>, length: &mut f64) -> Option<Step<PointOf<F>>> {
+        const FAR: [f64; 4] = [1e-5, 1e-4, 1e-3, 5e-3];
+        const NEAR: f64 = 0.02;
+        let [low, high] = self.range;
+        let onwards = last.tangent.parameter.signum();
+        let hopped = FAR.into_iter().find_map(|far| {
+            let mut at = last.at.clone();
+            let parameter = (last.parameter + far * onwards).clamp(low, high);
+            let arrival = self.correct(&mut at, parameter, None)?;
+            let station = self.station(at, arrival, None)?;
+            (station.at.point.distance(&last.at.point) < NEAR).then_some(station)
+        });
+        let mut station = hopped?;
+        if station.tangent.parameter.signum() != onwards {
+            station.tangent.turn_round();
+        }
+        *length = 0.1 * self.pace.longest;
+        Some(Step {
+            arrived: station.parameter <= low || station.parameter >= high,
+            station,
+            event: None,
+        })
     }
 
     /// The station between two where the parameter has a value.
@@ -675,16 +702,15 @@ fn move_along<P: Program>(
     drift: impl Fn(usize, usize) -> f64,
 ) -> f64 {
     const KEEP: f64 = 0.995;
-    let (mut primal, mut dual) = (1.0, 1.0);
-    for (k, slacks) in kkt.values().slacks.iter().enumerate() {
-        for (b, slack) in slacks.iter().enumerate().take(program.bounds()) {
-            let rate = kkt.slack_rate(k, b, &step.nodes) + drift(k, b);
-            if rate * primal < -KEEP * slack {
-                primal = -KEEP * slack / rate;
-            }
-            let (multiplier, falls) = (at.bound_multipliers[k][b], step.bounds[k][b]);
-            if falls * dual > KEEP * multiplier {
-                dual = KEEP * multiplier / falls;
+    let slacks = &kkt.values().slacks;
+    let used = program.bounds();
+    let mut rates = vec![[0.0; BOUNDS]; slacks.len()];
+    let mut primal = 1.0;
+    for (k, rates) in rates.iter_mut().enumerate() {
+        for (b, rate) in rates.iter_mut().enumerate().take(used) {
+            *rate = kkt.slack_rate(k, b, &step.nodes) + drift(k, b);
+            if *rate * primal < -KEEP * slacks[k][b] {
+                primal = -KEEP * slacks[k][b] / *rate;
             }
         }
     }
@@ -694,9 +720,13 @@ fn move_along<P: Program>(
     for (rows, step) in at.multipliers.iter_mut().zip(&step.constraints) {
         *rows += primal * step;
     }
-    for (multipliers, steps) in at.bound_multipliers.iter_mut().zip(&step.bounds) {
-        for (multiplier, step) in multipliers.iter_mut().zip(steps) {
-            *multiplier -= dual * step;
+    for (k, multipliers) in at.bound_multipliers.iter_mut().enumerate() {
+        for (b, multiplier) in multipliers.iter_mut().enumerate().take(used) {
+            let next = *multiplier - primal * step.bounds[k][b];
+            // That of a bound which lets go falls as the slack grows, and holds up no other.
+            let let_go = *multiplier * slacks[k][b] / (slacks[k][b] + primal * rates[k][b]);
+            let goes_on = next > (1.0 - KEEP) * *multiplier;
+            *multiplier = if goes_on { next } else { let_go };
         }
     }
     primal
