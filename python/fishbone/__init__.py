@@ -22,6 +22,7 @@ from fishbone.equilibrium import (
     Residuals,
     RibMargin,
     SnapMargin,
+    SpineRadius,
     solve,
     solve_many,
 )
