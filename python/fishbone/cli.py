@@ -17,7 +17,7 @@ from fishbone.errors import FishboneError, NoBranch
 from fishbone.files import check_writable, write_whole
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from fishbone.equilibrium import Equilibrium
     from fishbone.follow import Columns, Diagram
@@ -100,25 +100,46 @@ def command(context: click.Context) -> None:
     callback=_output(".stl", ".ply", ".obj", ".glb"),
     help="Write the surface: .stl, .ply, .obj or .glb.",
 )
+@click.option("--all", "is_all", is_flag=True, help="Find all equilibria, saddles too, and not one minimum alone.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON instead of a table.")
-def solve(file: Path, *, out: Path | None, figure: Path | None, mesh: Path | None, as_json: bool) -> None:
+def solve(  # noqa: PLR0913 - one for each option
+    file: Path, *, out: Path | None, figure: Path | None, mesh: Path | None, is_all: bool, as_json: bool
+) -> None:
     """Solve a scenario.
 
-    FILE is .toml or .json; what came out is printed as a table.
+    FILE is .toml or .json; what came out is printed as a table. With --all that has a row for each equilibrium, the
+    result is a list of them, and the figure shows them side by side.
 
     Exit code: 0 converged, 2 invalid input, 3 infeasible or not converged.
     """
+    if is_all and mesh is not None:
+        raise Invalid("--mesh: found with --all, allowed without it: a mesh is that of one shape")
     pictures = _pictures(figure, mesh)
     _spare(file, out)
-    equilibrium = fishbone.solve(fishbone.load(file))
+    scenario = fishbone.load(file)
+    found = _all(scenario) if is_all else [fishbone.solve(scenario)]
+    converged = [equilibrium for equilibrium in found if equilibrium.status == "converged"]
     # All is made before anything is written, so that a failure leaves nothing behind.
     contents = {}
+    text = _encode_found(found, is_all=is_all) if as_json or out is not None else ""
     if out is not None:
-        contents[out] = encode(equilibrium.to_dict()).encode()
-    if equilibrium.status == "converged":
-        contents |= {path: encode_picture(equilibrium, path.suffix) for path, encode_picture in pictures}
+        contents[out] = text.encode()
+    if converged:
+        subject = converged if is_all else converged[0]
+        contents |= {path: encode_picture(subject, path.suffix) for path, encode_picture in pictures}
     _write_all(contents)
-    _print(equilibrium, file, as_json=as_json)
+    if as_json:
+        click.echo(text, nl=False)
+    if not converged:
+        raise NoEquilibrium(f"{file}: {_reason(found[0])}")
+    if not as_json:
+        _print(converged, is_all=is_all)
+    _warn(file, converged)
+
+
+def _all(scenario: fishbone.Scenario) -> list[Equilibrium]:
+    with _progress(lambda done, planned: ("searching", done, planned)) as progress:
+        return fishbone.branches(scenario, progress=progress)
 
 
 def _spare(file: Path, out: Path | None) -> None:
@@ -126,9 +147,9 @@ def _spare(file: Path, out: Path | None) -> None:
         raise Invalid(f"{out}: found the scenario itself, allowed another file")
 
 
-def _pictures(figure: Path | None, mesh: Path | None) -> list[tuple[Path, Callable[[Equilibrium, str], bytes]]]:
+def _pictures(figure: Path | None, mesh: Path | None) -> list[tuple[Path, Callable[[Any, str], bytes]]]:
     """What is to be drawn, and how; asked before the solve, so that a package that is missing is missed then."""
-    pictures: list[tuple[Path, Callable[[Equilibrium, str], bytes]]] = []
+    pictures: list[tuple[Path, Callable[[Any, str], bytes]]] = []
     # Whoever wants no picture does not wait for these imports.
     if figure is not None:
         from fishbone import plot  # noqa: PLC0415
@@ -147,6 +168,16 @@ def encode(result: dict[str, Any]) -> str:
     return "{\n" + ",\n".join(fields) + "\n}\n"
 
 
+def encode_list(results: Iterable[dict[str, Any]]) -> str:
+    """Results as one JSON array."""
+    return "[\n" + ",\n".join(encode(result).rstrip() for result in results) + "\n]\n"
+
+
+def _encode_found(found: list[Equilibrium], *, is_all: bool) -> str:
+    results = [equilibrium.to_dict() for equilibrium in found]
+    return encode_list(results) if is_all else encode(results[0])
+
+
 def _write_all(contents: dict[Path, bytes]) -> None:
     for path, content in contents.items():
         _write(path, content)
@@ -159,19 +190,23 @@ def _write(path: Path, content: bytes) -> None:
         raise Invalid(f"{path}: not written: {error.strerror}") from error
 
 
-def _print(equilibrium: Equilibrium, file: Path, *, as_json: bool) -> None:
-    if as_json:
-        click.echo(encode(equilibrium.to_dict()), nl=False)
-    if equilibrium.status != "converged":
-        status = equilibrium.status.replace("_", " ")
-        raise NoEquilibrium(f"{file}: {status}: {' '.join(equilibrium.message.split())}")
-    if not as_json:
-        from rich.console import Console  # noqa: PLC0415
+def _reason(equilibrium: Equilibrium) -> str:
+    """Why a solve ended without an equilibrium."""
+    return f"{equilibrium.status.replace('_', ' ')}: {' '.join(equilibrium.message.split())}"
 
-        from fishbone.report import report  # noqa: PLC0415
 
-        Console(highlight=False).print(report(equilibrium))
-    for warning in equilibrium.warnings:
+def _print(equilibria: list[Equilibrium], *, is_all: bool) -> None:
+    from rich.console import Console  # noqa: PLC0415
+
+    from fishbone.report import report, report_all  # noqa: PLC0415
+
+    Console(highlight=False).print(report_all(equilibria) if is_all else report(equilibria[0]))
+
+
+def _warn(file: Path, equilibria: list[Equilibrium]) -> None:
+    """Passes warnings on, each once. Of several equilibria a saddle is expected, and the table tells of it."""
+    told = equilibria if len(equilibria) == 1 else [one for one in equilibria if one.stable is not False]
+    for warning in dict.fromkeys(warning for equilibrium in told for warning in equilibrium.warnings):
         click.echo(f"fishbone: {file}: warning: {warning}", err=True)
 
 
@@ -234,7 +269,7 @@ def follow(  # noqa: PLR0913 - one for each option
     _spare(file, out)
     scenario = fishbone.load(file)
     try:
-        with _progress() as progress:
+        with _progress(lambda branch, share: (f"branch {branch}", share, 1.0)) as progress:
             diagram = fishbone.follow(scenario, path, step=step, states=states, branches=branches, progress=progress)
     except NoBranch as error:
         raise NoEquilibrium(f"{file}: {' '.join(str(error).split())}") from error
@@ -307,8 +342,10 @@ def _place(text: str) -> Place:
 
 
 @contextlib.contextmanager
-def _progress() -> Iterator[Callable[[int, float], object] | None]:
-    """What shows how far it has come, on a terminal."""
+def _progress(
+    read: Callable[[int, float], tuple[str, float, float]],
+) -> Iterator[Callable[[int, float], object] | None]:
+    """What shows how far it has come, on a terminal; `read` turns what it is told into words, what is done, and all."""
     from rich.console import Console  # noqa: PLC0415
 
     console = Console(stderr=True)
@@ -318,8 +355,13 @@ def _progress() -> Iterator[Callable[[int, float], object] | None]:
     from rich.progress import Progress  # noqa: PLC0415
 
     with Progress(console=console, transient=True) as bar:
-        task = bar.add_task("branch 0", total=1.0)
-        yield lambda branch, share: bar.update(task, description=f"branch {branch}", completed=share)
+        task = bar.add_task("", total=None)
+
+        def show(count: int, amount: float) -> None:
+            words, done, planned = read(count, amount)
+            bar.update(task, description=words, completed=done, total=planned)
+
+        yield show
 
 
 def encode_table(columns: Columns) -> bytes:

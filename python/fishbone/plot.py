@@ -1,4 +1,4 @@
-"""Pictures of an equilibrium and of a diagram; needs `pip install "fishbone[plot]"`."""
+"""Pictures of an equilibrium, of several, and of a diagram; needs `pip install "fishbone[plot]"`."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ except ImportError:
     raise MissingPackage("matplotlib", "plot") from None
 
 from fishbone import chart
+from fishbone.equilibrium import Equilibrium
 from fishbone.follow import Diagram
 from fishbone.scene import (
     ARROW,
@@ -53,13 +54,13 @@ from fishbone.scene import (
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.figure import SubFigure
     from numpy.typing import ArrayLike
 
-    from fishbone.equilibrium import Equilibrium, Floats
+    from fishbone.equilibrium import Floats
     from fishbone.tracker import Place
 
     Style = dict[str, Any]
@@ -90,6 +91,10 @@ _WIDTH, _DECORATION, _GRAPHS, _KEY = 7.0, 0.6, 2.0, 0.55
 _PANEL = 1.9
 """Height of a panel of a diagram [in]."""
 _FLAT_HEIGHTS = (0.35, 2.4)
+SHOWN = 12
+"""Equilibria on one page, at most."""
+_COLUMNS, _PANEL_TITLE = 3, 0.25
+"""Side by side, and height of a title [in]."""
 
 # Third-angle projection: the top view stands over the front view, the view from the right stands right of it.
 _TOP = View("Top view (from +x)", UNIT[_Y], UNIT[_Z], UNIT[_X])
@@ -135,6 +140,23 @@ def oblique(equilibrium: Equilibrium, viewer: ArrayLike = VIEWER) -> Figure:
         return figure
 
 
+def overview(equilibria: Sequence[Equilibrium], viewer: ArrayLike = VIEWER) -> Figure:
+    """Several equilibria of a belt side by side, with energies and stability, as `branches` gives them.
+
+    All are in parallel projection on one scale, seen from the direction `viewer`, the world's x upwards. Of more than
+    12 the first 12 are shown.
+
+    Shapes: viewer (3,), not along x.
+    Errors: `InvalidArgument` where there is none, or one has no shape to draw.
+    """
+    if not equilibria:
+        raise InvalidArgument("equilibria: found none, allowed one or more")
+    for equilibrium in equilibria:
+        _check(equilibrium)
+    with mpl.rc_context(_STYLE):
+        return _draw_overview(equilibria, viewer)
+
+
 def diagram(diagram: Diagram, support: Place | None = None) -> Figure:
     """Energy, height and the force of a support over the parameter: lines of stable states are solid, others dashed.
 
@@ -148,27 +170,33 @@ def diagram(diagram: Diagram, support: Place | None = None) -> Figure:
         return _draw_diagram(diagram, support)
 
 
-def encode(subject: Equilibrium | Diagram, suffix: str) -> bytes:
+def encode(subject: Equilibrium | Sequence[Equilibrium] | Diagram, suffix: str) -> bytes:
     """The picture's file content, by the suffix of its name; equal for equal shapes as PNG and PDF.
 
-    Of an equilibrium it is that of `views`.
+    Of an equilibrium it is that of `views`, of several that of `overview`.
 
-    Errors: `InvalidArgument` where the suffix is none of `SUFFIXES`.
+    Errors: `InvalidArgument` where the suffix is none of `SUFFIXES`, or there is nothing to draw.
     """
     suffix = suffix.lower()
     if suffix not in SUFFIXES:
         raise InvalidArgument(f"figure: found {suffix or 'no suffix'}, allowed {', '.join(SUFFIXES)}")
     content = io.BytesIO()
-    figure = diagram(subject) if isinstance(subject, Diagram) else views(subject)
+    figure = _figure_of(subject)
     with mpl.rc_context(_STYLE):
         figure.savefig(content, format=suffix[1:], metadata=_METADATA[suffix])
     return content.getvalue()
 
 
-def save(subject: Equilibrium | Diagram, path: str | os.PathLike[str]) -> None:
+def _figure_of(subject: Equilibrium | Sequence[Equilibrium] | Diagram) -> Figure:
+    if isinstance(subject, Diagram):
+        return diagram(subject)
+    return views(subject) if isinstance(subject, Equilibrium) else overview(subject)
+
+
+def save(subject: Equilibrium | Sequence[Equilibrium] | Diagram, path: str | os.PathLike[str]) -> None:
     """Writes the picture to a file, .png, .pdf or .svg.
 
-    Errors: `InvalidArgument` for another suffix, `OSError`.
+    Errors: `InvalidArgument` for another suffix or where there is nothing to draw, `OSError`.
     """
     path = Path(path)
     write_whole(path, encode(subject, path.suffix))
@@ -267,6 +295,50 @@ def _key(equilibrium: Equilibrium) -> Iterator[Line2D | Patch]:
         yield Line2D([], [], label="force", color=ARROW["color"], **arrow)
     if gravity_of(tables).any():
         yield Line2D([], [], label="gravity", color=GRAVITY["color"], **arrow)
+
+
+# -------------------------------------------------------------------------------------------------- several shapes
+
+
+def _draw_overview(equilibria: Sequence[Equilibrium], viewer: ArrayLike) -> Figure:
+    shown = equilibria[:SHOWN]
+    columns = min(_COLUMNS, len(shown))
+    rows = -(-len(shown) // columns)
+    side = _WIDTH / _COLUMNS
+    figure = Figure(figsize=(side * columns, side * rows), layout="constrained")
+    first = equilibria[0]
+    name = first.scenario.to_dict().get("name") or "belt"
+    more = len(equilibria) - len(shown)
+    rest = f"; {more} more are not shown" if more else ""
+    figure.suptitle(f"{name}: {first.energy_model} energy{rest}", fontsize=10.0, parse_math=False)
+    panels = figure.subplots(rows, columns, squeeze=False).ravel().tolist()
+    for axes, equilibrium in zip(panels, shown, strict=False):
+        draw_oblique(axes, equilibrium, viewer)
+        axes.set_title(f"{equilibrium.energy:.5g}, {stability(equilibrium)}")
+    for axes in panels[len(shown) :]:
+        axes.set_axis_off()
+    height = side * _set_one_scale(panels[: len(shown)])
+    figure.set_figheight(rows * (height + _PANEL_TITLE) + _DECORATION)
+    return figure
+
+
+def stability(equilibrium: Equilibrium) -> str:
+    """What is known of an equilibrium's stability, in a few words."""
+    if equilibrium.stable is None:
+        return "stability not known"
+    if equilibrium.stable:
+        return "stable"
+    return "1 negative mode" if equilibrium.negative_modes == 1 else f"{equilibrium.negative_modes} negative modes"
+
+
+def _set_one_scale(panels: Sequence[Axes]) -> float:
+    """Gives all the same extent, each about its own middle; its height over its width."""
+    limits = np.array([(axes.get_xlim(), axes.get_ylim()) for axes in panels])
+    half = np.ptp(limits, axis=-1).max(axis=0) / 2.0
+    for axes, middle in zip(panels, limits.mean(axis=-1), strict=True):
+        (left, bottom), (right, top) = middle - half, middle + half
+        axes.set(xlim=(left, right), ylim=(bottom, top))
+    return float(half[1] / half[0])
 
 
 # --------------------------------------------------------------------------------------------------- the diagram

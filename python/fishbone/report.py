@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable, Iterator, Sequence
 
     from fishbone.equilibrium import Equilibrium, Floats
     from fishbone.follow import Branch, Diagram, Event
@@ -29,6 +29,8 @@ ENDS = {
 """What becomes of a branch that does not end with the path."""
 NOUGHT = 1e-9
 """Rib angle [degrees] that is rounding."""
+MINIMUM = {True: "yes", False: "no", None: "not known"}
+"""Whether an equilibrium is a local minimum."""
 
 
 def report(equilibrium: Equilibrium) -> Group:
@@ -36,6 +38,15 @@ def report(equilibrium: Equilibrium) -> Group:
     tables = equilibrium.scenario.to_dict()
     title = f"{tables.get('name') or 'belt'}: {equilibrium.energy_model} energy, {equilibrium.status}"
     return Group(Text(title, style="bold"), Text(_supports(equilibrium)), _scalars(equilibrium), _vectors(equilibrium))
+
+
+def report_all(equilibria: Sequence[Equilibrium]) -> Group:
+    """All that the command line tells of the equilibria of a scenario: a row each."""
+    first = equilibria[0]
+    name = first.scenario.to_dict().get("name") or "belt"
+    count = "1 equilibrium" if len(equilibria) == 1 else f"{len(equilibria)} equilibria"
+    title = Text(f"{name}: {first.energy_model} energy, {count}", style="bold")
+    return Group(title, Text(_supports(first)), _equilibria(equilibria))
 
 
 def report_diagram(diagram: Diagram) -> Group:
@@ -110,7 +121,7 @@ def _quantities(equilibrium: Equilibrium) -> Iterator[tuple[str, str, str]]:
     yield from _extremes(equilibrium)
     if equilibrium.half_turns is not None:
         yield "half turns", str(equilibrium.half_turns), "of a closed belt"
-    yield "local minimum", {True: "yes", False: "no", None: "not known"}[equilibrium.stable], ""
+    yield "local minimum", MINIMUM[equilibrium.stable], ""
     for name, residual in equilibrium.residuals._asdict().items():
         yield f"residual, {name}", f"{residual:.1e}", ""
     yield "iterations", str(equilibrium.iterations), ""
@@ -182,6 +193,51 @@ def _place(at: float | str, u: Floats) -> str:
         if math.isclose(at, end, abs_tol=1e-9 * u[-1]):
             return name
     return f"u = {number(at)}"
+
+
+# ------------------------------------------------------------------------------------------ of several equilibria
+
+
+def _equilibria(equilibria: Sequence[Equilibrium]) -> Table:
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    table.add_column("energy", justify="right")
+    table.add_column("local\nminimum")
+    for heading in ("negative\nmodes", "height", "bend\nradius\non spine", "largest\nforce", "twist"):
+        table.add_column(heading, justify="right")
+    table.add_column("crosses\nitself")
+    radii = [equilibrium.least_spine_radius for equilibrium in equilibria]
+    columns = [
+        [number(equilibrium.energy) for equilibrium in equilibria],
+        [MINIMUM[equilibrium.stable] for equilibrium in equilibria],
+        ["" if one.negative_modes is None else str(one.negative_modes) for one in equilibria],
+        _column([_height(equilibrium) for equilibrium in equilibria]),
+        _column([None if radius is None else radius.value for radius in radii]),
+        _column([_largest_force(equilibrium) for equilibrium in equilibria]),
+        _column([equilibrium.twist for equilibrium in equilibria]),
+        ["no" if equilibrium.crosses_itself is None else "yes" for equilibrium in equilibria],
+    ]
+    for cells in zip(*columns, strict=True):
+        table.add_row(*cells)
+    return table
+
+
+def _column(values: Sequence[float | None]) -> list[str]:
+    """Numbers with equal decimals, empty where there is none."""
+    numbers = np.array([value for value in values if value is not None])
+    cells = iter(row(numbers) if len(numbers) else [])
+    return ["" if value is None else next(cells) for value in values]
+
+
+def _height(equilibrium: Equilibrium) -> float:
+    """How far the highest point is along the bulge."""
+    bulge = np.array(equilibrium.scenario.to_dict()["solver"]["bulge"])
+    return float(equilibrium.highest_point.position @ bulge / np.linalg.norm(bulge))
+
+
+def _largest_force(equilibrium: Equilibrium) -> float | None:
+    supports = range(len(equilibrium.scenario.to_dict()["supports"]))
+    forces = [float(np.linalg.norm(equilibrium.reaction(index).force)) for index in supports]
+    return max(forces, default=None)
 
 
 # --------------------------------------------------------------------------------------------------- a diagram's
