@@ -36,3 +36,29 @@ def out_of_reach(example: fb.Scenario) -> fb.Scenario:
 def turned() -> fb.Diagram:
     """A planar arch whose end is turned against it: a fold, and a snap."""
     return fb.follow(fb.load(ROOT / "scenarios" / "planar.toml"), {"supports[1].rotation[2]": -1.5})
+
+
+@pytest.fixture(scope="session")
+def arch() -> fb.Scenario:
+    """Clamps in line at 0.6 lengths: Euler's elastica is the lowest equilibrium."""
+    return fb.load(ROOT / "scenarios" / "planar.toml")
+
+
+@pytest.fixture(scope="session")
+def arches(arch: fb.Scenario) -> list[fb.Equilibrium]:
+    """All its equilibria: a search of some seconds."""
+    return fb.branches(arch)
+
+
+@pytest.fixture(scope="session")
+def mirrored(arch: fb.Scenario) -> fb.Scenario:
+    """The same to the other side, on a mesh that is half as fine and takes a third of the time."""
+    tables = arch.to_dict()
+    tables["solver"] |= {"bulge": [-1.0, 0.0, 0.0], "elements": 40}
+    return fb.Scenario.from_dict(tables)
+
+
+@pytest.fixture(scope="session")
+def mirrored_arches(mirrored: fb.Scenario) -> list[fb.Equilibrium]:
+    """All its equilibria."""
+    return fb.branches(mirrored)

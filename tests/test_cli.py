@@ -5,10 +5,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import fishbone as fb
-from fishbone import cli, examples, files, plot
+from fishbone import cli, examples, files, plot, report
 
 
 @pytest.fixture
@@ -261,7 +262,7 @@ def test_version_and_help_are_exit_0(run):
     assert run("--version")[:2] == (0, f"fishbone, version {fb.__version__}\n")
     code, out, _ = run("solve", "--help")
     assert code == 0
-    for option in ("--out", "--figure", "--mesh", "--json"):
+    for option in ("--out", "--figure", "--mesh", "--all", "--json"):
         assert option in out
 
 
@@ -309,6 +310,127 @@ def test_nothing_is_written_where_a_picture_cannot_be_made(run, monkeypatch, exa
     assert code == 2
     assert_one_line(err, "no picture")
     assert list(Path().iterdir()) == []
+
+
+# ---------------------------------------------------------------------------------------------------------- all
+
+
+@pytest.fixture
+def told(monkeypatch, arches):
+    """Gives the equilibria of the planar arch for whatever is asked, at no search; what is told of the search."""
+    told = []
+
+    def branches(scenario, *, progress):
+        told.append(progress)
+        if progress is not None:
+            progress(1, 2)
+        return arches
+
+    monkeypatch.setattr(fb, "branches", branches)
+    return told
+
+
+def test_all_is_an_array_of_what_branches_finds_byte_for_byte(run, mirrored, mirrored_arches):
+    """A search of its own: the same twice."""
+    Path("mirrored.json").write_text(json.dumps(mirrored.to_dict()), "utf-8")
+    code, out, err = run("solve", "mirrored.json", "--all", "--json", "--out", "a.json")
+    assert code == 0
+    assert_one_line(err, "warning", "80")
+    assert out == Path("a.json").read_text("utf-8")
+    found = json.loads(out)
+    expected = [equilibrium.to_dict() for equilibrium in mirrored_arches]
+    for result in (*found, *expected):
+        del result["solve_time"]
+    assert json.dumps(found) == json.dumps(expected)
+
+
+def test_all_has_a_row_for_each_equilibrium(run, planar_file, told, arches):
+    code, out, err = run("solve", planar_file, "--all")
+    assert (code, err) == (0, "")
+    assert all(len(line) <= 80 for line in out.splitlines())
+    assert f"{len(arches)} equilibria" in out
+    rows = [line.split() for line in out.splitlines()[-len(arches) - 1 :] if line.strip()]
+    assert [row[0] for row in rows] == [report.number(one.energy) for one in arches]
+    assert [row[1] for row in rows] == ["yes" if one.stable else "no" for one in arches]
+    assert [int(row[2]) for row in rows] == [one.negative_modes for one in arches]
+    for column, values in (
+        (3, [one.highest_point.position[0] for one in arches]),
+        (4, [one.least_spine_radius.value for one in arches]),
+        (5, [max(np.linalg.norm(one.reaction(index).force) for index in (0, 1)) for one in arches]),
+        (6, [one.twist for one in arches]),
+    ):
+        assert [float(row[column]) for row in rows] == pytest.approx(values, abs=1e-4 * np.abs(values).max())
+    assert [row[7] for row in rows] == ["no" if one.crosses_itself is None else "yes" for one in arches]
+
+
+def test_all_is_drawn_on_one_page(run, planar_file, told, arches):
+    code, _, _ = run("solve", planar_file, "--all", "--figure", "a.png", "--out", "a.json")
+    assert code == 0
+    assert sorted(path.name for path in Path().iterdir()) == ["a.json", "a.png"]
+    assert Path("a.png").read_bytes() == plot.encode(arches, ".png")
+
+
+def test_all_has_no_mesh(run, monkeypatch, planar_file):
+    monkeypatch.setattr(fb, "branches", lambda *_, **__: pytest.fail("searched"))
+    code, out, err = run("solve", planar_file, "--all", "--mesh", "a.stl")
+    assert (code, out) == (2, "")
+    assert_one_line(err, "--mesh", "--all")
+    assert not list(Path().iterdir())
+
+
+def test_all_without_any_is_exit_3_with_a_result_and_no_picture(run, out_of_reach_file):
+    code, out, err = run("solve", out_of_reach_file, "--all", "--out", "a.json", "--figure", "a.png")
+    assert (code, out) == (3, "")
+    assert_one_line(err, out_of_reach_file, "infeasible")
+    assert [path.name for path in Path().iterdir()] == ["a.json"]
+    [only] = json.loads(Path("a.json").read_text("utf-8"))
+    assert only["status"] == "infeasible"
+
+
+def test_all_writes_nothing_where_a_picture_cannot_be_made(run, monkeypatch, planar_file, told):
+    def fail(*_):
+        raise fb.FishboneError("no picture")
+
+    monkeypatch.setattr(plot, "encode", fail)
+    code, out, err = run("solve", planar_file, "--all", "--out", "a.json", "--figure", "a.png")
+    assert (code, out) == (2, "")
+    assert_one_line(err, "no picture")
+    assert not list(Path().iterdir())
+
+
+def test_all_passes_every_warning_on_once(run, monkeypatch, example):
+    tables = example.to_dict()
+    tables["solver"]["elements"] = 40
+    Path("coarse.json").write_text(json.dumps(tables), "utf-8")
+    equilibrium = fb.solve(fb.Scenario.from_dict(tables))
+    monkeypatch.setattr(fb, "branches", lambda *_, **__: [equilibrium, equilibrium])
+    code, out, err = run("solve", "coarse.json", "--all")
+    assert (code, "2 equilibria" in out) == (0, True)
+    assert_one_line(err, "coarse.json", "warning", "80")
+
+
+def test_all_shows_its_progress_on_a_terminal_only(run, monkeypatch, planar_file, told):
+    assert run("solve", planar_file, "--all")[2] == ""
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    err = run("solve", planar_file, "--all")[2]
+    assert "searching" in err
+    assert "50%" in err
+    assert told[0] is None
+    assert told[1] is not None
+
+
+def test_control_c_ends_all_with_exit_130_and_one_line(planar_file, tmp_path):
+    """The command as it is run, interrupted while the core is at work."""
+    code = (
+        "import signal, sys, threading\n"
+        "from fishbone import cli\n"
+        "threading.Timer(1.0, signal.raise_signal, [signal.SIGINT]).start()\n"
+        f"sys.exit(cli.main(['solve', {str(planar_file)!r}, '--all', '--out', 'a.json', '--figure', 'a.png']))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (130, "")
+    assert_one_line(done.stderr, "interrupted")
+    assert not list(tmp_path.iterdir())
 
 
 # ------------------------------------------------------------------------------------------------------- follow

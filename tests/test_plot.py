@@ -291,3 +291,51 @@ def test_a_diagram_is_saved_like_an_equilibrium(turned, tmp_path):
     with pytest.raises(fb.InvalidArgument, match=r"found \.bmp, allowed \.png"):
         plot.save(turned, tmp_path / "diagram.bmp")
     assert [path.name for path in tmp_path.iterdir()] == ["diagram.svg"]
+
+
+# ---------------------------------------------------------------------------------------------- several equilibria
+
+
+def test_an_overview_says_energy_and_stability_of_each(arches):
+    figure = plot.overview(arches)
+    titles = [axes.get_title() for axes in figure.axes if axes.get_title()]
+    assert titles == [f"{one.energy:.5g}, {plot.stability(one)}" for one in arches[: plot.SHOWN]]
+    assert titles[0].endswith(", stable")
+    assert any(title.endswith(", 1 negative mode") for title in titles)
+
+
+def test_an_overview_has_one_scale(arches):
+    figure = plot.overview(arches[:5])
+    figure.draw_without_rendering()
+    scales = [axes.bbox.width / np.ptp(axes.get_xlim()) for axes in figure.axes[:5]]
+    np.testing.assert_allclose(scales, scales[0], rtol=1e-6)
+    for axes in figure.axes[:5]:
+        [low, high] = axes.dataLim.get_points()
+        assert (low >= (axes.get_xlim()[0], axes.get_ylim()[0])).all()
+        assert (high <= (axes.get_xlim()[1], axes.get_ylim()[1])).all()
+
+
+def test_an_overview_says_how_many_more_there_are(arches):
+    many = (arches * plot.SHOWN)[: plot.SHOWN + 3]
+    figure = plot.overview(many)
+    assert "3 more" in figure.get_suptitle()
+    assert sum(bool(axes.get_title()) for axes in figure.axes) == plot.SHOWN
+    assert "more" not in plot.overview(many[: plot.SHOWN]).get_suptitle()
+
+
+def test_one_equilibrium_is_an_overview_too(equilibrium):
+    assert plot.encode([equilibrium], ".pdf") != plot.encode(equilibrium, ".pdf")
+
+
+def test_the_same_equilibria_give_the_same_picture(arches, tmp_path):
+    plot.save(arches[:2], tmp_path / "a.png")
+    assert (tmp_path / "a.png").read_bytes() == plot.encode(arches[:2], ".png")
+
+
+def test_an_overview_of_nothing_is_refused(equilibrium, out_of_reach):
+    with pytest.raises(fb.InvalidArgument, match="found none"):
+        plot.encode([], ".png")
+    infeasible = fb.solve(out_of_reach)
+    if not np.isfinite(infeasible.position).all():
+        with pytest.raises(fb.InvalidArgument, match="no shape"):
+            plot.overview([equilibrium, infeasible])

@@ -1,0 +1,216 @@
+"""All equilibria of a scenario, what a refined mesh makes of them, and solves from given shapes.
+
+The scenario is the planar arch at 0.6, whose lowest equilibrium is known in closed form: see `helpers.Elastica`.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import fishbone as fb
+from helpers import Elastica, spine_at
+
+SIDES = [np.diag(signs) for signs in ([1, 1, 1], [-1, 1, 1], [1, 1, -1], [-1, 1, -1])]
+"""What takes clamps in line to themselves: nothing, two mirrors and half a turn."""
+SAME = 1e-3
+"""Distance [U] within which spines are the same."""
+
+
+def distance(one: fb.Equilibrium, other: fb.Equilibrium) -> float:
+    """Largest distance of two spines, mirrored or not, from the start or from the end, whichever is least."""
+    seen = other.position
+    own = one.position[:: (len(one.u) - 1) // (len(seen) - 1)]
+    forth = [own @ side for side in SIDES]
+    back = [(own[0] + own[-1] - position)[::-1] for position in forth]
+    moves = [np.linalg.norm(seen - position, axis=1).max() for position in (*forth, *back)]
+    return float(min(moves))
+
+
+class EnoughError(Exception):
+    """Ends a search."""
+
+
+def result(equilibrium: fb.Equilibrium) -> dict:
+    return {key: value for key, value in equilibrium.to_dict().items() if key != "solve_time"}
+
+
+# ------------------------------------------------------------------------------------------------- what is found
+
+
+def test_lowest_is_the_elastica(arches):
+    reference = Elastica(0.6)
+    assert arches[0].energy == pytest.approx(reference.energy, rel=1e-5)
+    assert arches[0].highest_point.position[0] == pytest.approx(reference.height, rel=1e-4)
+    assert arches[0].stable is True
+
+
+def test_the_second_mode_of_the_elastica_is_a_saddle(arches):
+    """The S, plane and with its middle on the line between the clamps; above it are others with more waves."""
+    plane = [one for one in arches if np.abs(one.position[:, 2]).max() < 1e-6]
+    middle = [one.position[len(one.u) // 2] for one in plane]
+    saddles = [one for one, x in zip(plane, middle, strict=True) if np.allclose(x, [0.0, 0.3, 0.0], atol=1e-6)]
+    assert saddles[0].stable is False
+    assert saddles[0].negative_modes == 1
+
+
+def test_all_are_equilibria_rising_in_energy(arches):
+    energies = [one.energy for one in arches]
+    assert energies == sorted(energies)
+    for one in arches:
+        assert one.status == "converged"
+        assert max(one.residuals) <= 1e-8
+
+
+def test_no_two_are_the_same_mirrored_or_not(arches):
+    for one, other in combinations(arches, 2):
+        assert distance(one, other) > SAME
+
+
+def test_some_pass_through_themselves(arches):
+    assert arches[0].crosses_itself is None
+    assert any(one.crosses_itself for one in arches)
+
+
+def test_stability_is_that_of_the_count(arches):
+    for one in arches:
+        assert one.negative_modes in {0, 1, 2}
+        assert one.zero_modes == 0
+        assert one.stable is (one.negative_modes == 0)
+    for one in arches[:3]:
+        assert sum(mode.eigenvalue < 0.0 for mode in one.modes(3)) == one.negative_modes
+
+
+def test_a_saddle_lies_above_the_minima_on_either_side(arches, arch):
+    """Pushed either way along its one negative mode a belt falls to minima that are among those found."""
+    saddle = next(one for one in arches if one.negative_modes == 1)
+    (mode,) = saddle.modes(1)
+    assert mode.eigenvalue < 0.0
+    for sign in (1.0, -1.0):
+        start = (saddle.bend + 0.05 * sign * mode.bend, saddle.rib_slope + 0.05 * sign * mode.rib_slope)
+        minimum = fb.solve(arch, start=start)
+        assert minimum.stable
+        assert minimum.energy < saddle.energy
+        assert min(distance(minimum, one) for one in arches) < SAME
+
+
+def test_a_finer_mesh_has_them_too(arches):
+    for one in arches:
+        fine = one.refined(160)
+        assert fine is not None
+        assert len(fine.u) == 161
+        assert fine.scenario.to_dict()["solver"]["elements"] == 160
+        assert fine.energy == pytest.approx(one.energy, rel=1e-2)
+        assert fine.negative_modes == one.negative_modes
+        assert np.abs(spine_at(fine, one.u) - one.position).max() < 0.03
+
+
+def test_of_mirror_twins_the_one_is_given_that_bulges_as_asked(arches, mirrored_arches):
+    """Asked for the other side, of the lowest four each comes once, mirrored; the mesh is another."""
+    for one, other in zip(arches[:4], mirrored_arches, strict=False):
+        assert other.energy == pytest.approx(one.energy, rel=1e-3)
+        assert other.negative_modes == one.negative_modes
+        assert distance(one, other) < 10.0 * SAME
+    for equilibria, side in ((arches, 1.0), (mirrored_arches, -1.0)):
+        for one in equilibria:
+            x = side * one.position[:, 0]
+            assert x.max() >= -x.min() - SAME
+
+
+# ---------------------------------------------------------------------------------------- how it is asked and told
+
+
+def test_out_of_reach_is_one_infeasible_result(out_of_reach):
+    [only] = fb.branches(out_of_reach)
+    assert only.status == "infeasible"
+    assert result(only) == result(fb.solve(out_of_reach))
+
+
+def test_progress_never_passes_what_is_planned(arch):
+    told = []
+
+    def progress(done, planned):
+        told.append((done, planned))
+        if len(told) == 5:
+            raise EnoughError
+
+    with pytest.raises(EnoughError):
+        fb.branches(arch, progress=progress)
+    assert all(0 <= done <= planned for done, planned in told)
+    assert told == sorted(told)
+
+
+@pytest.mark.parametrize("nothing", [None, {}, SimpleNamespace(_inner=None)])
+def test_what_is_no_scenario_is_refused(nothing):
+    with pytest.raises(fb.InvalidArgument, match="scenario: found"):
+        fb.branches(nothing)
+
+
+# ----------------------------------------------------------------------------------------------------- refined
+
+
+@pytest.mark.parametrize("elements", [0, -1, 3, 10**6])
+def test_refined_takes_the_elements_that_a_scenario_takes(equilibrium, elements):
+    with pytest.raises(fb.InvalidArgument, match=r"solver\.elements: found"):
+        equilibrium.refined(elements)
+
+
+def test_refined_is_what_a_solve_on_that_mesh_gives(equilibrium):
+    fine = equilibrium.refined(160)
+    tables = equilibrium.scenario.to_dict()
+    tables["solver"]["elements"] = 160
+    afresh = fb.solve(fb.Scenario.from_dict(tables))
+    assert fine.energy == pytest.approx(afresh.energy, rel=1e-7)
+    assert np.abs(fine.position - afresh.position).max() < 1e-5
+    assert fine.scenario == afresh.scenario
+
+
+def test_refined_leaves_a_saddle_a_saddle(arches):
+    saddle = next(one for one in arches if one.negative_modes == 1)
+    coarse, fine = saddle.refined(100), saddle.refined(200)
+    assert coarse.negative_modes == fine.negative_modes == 1
+    assert coarse.energy == pytest.approx(fine.energy, rel=1e-3)
+
+
+def test_what_has_no_equilibrium_cannot_be_refined(out_of_reach):
+    assert fb.solve(out_of_reach).refined(160) is None
+
+
+# ------------------------------------------------------------------------------------------- solves from a shape
+
+
+def test_a_start_near_a_higher_minimum_gives_it(arches, arch):
+    higher = next(one for one in arches[1:] if one.stable)
+    wobble = 0.02 * np.sin(3.0 * np.pi * higher.u)
+    again = fb.solve(arch, start=(higher.bend + 5.0 * wobble, higher.rib_slope + wobble))
+    assert again.energy == pytest.approx(higher.energy, rel=1e-8)
+    assert fb.solve(arch).energy == pytest.approx(arches[0].energy, rel=1e-8)
+
+
+def test_a_start_may_have_fewer_points_than_the_mesh(arches, arch):
+    higher = next(one for one in arches[1:] if one.stable)
+    again = fb.solve(arch, start=(higher.bend[::4], higher.rib_slope[::4]))
+    assert again.energy == pytest.approx(higher.energy, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("start", "said"),
+    [
+        (([0.0], [0.0]), "m at least 2"),
+        (([0.0, 0.0], [0.0, 0.0, 0.0]), "found shapes.*allowed"),
+        (([[0.0, 0.0]], [[0.0, 0.0]]), "found shapes.*allowed"),
+        ((0.0, 0.0), "found shapes.*allowed"),
+        (([0.0, np.nan], [0.0, 0.0]), "not finite"),
+        (([0.0, 0.0], [0.0, np.inf]), "not finite"),
+        ((["bent", "flat"], [0.0, 0.0]), "no pair"),
+        (([0.0, 0.0],), "no pair"),
+        (7, "no pair"),
+        ("ab", "no pair"),
+    ],
+)
+def test_what_is_no_shape_is_no_start(arch, start, said):
+    with pytest.raises(fb.InvalidArgument, match=f"start: .*{said}"):
+        fb.solve(arch, start=start)
