@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 ENERGIES = ("fishbone", "sadowsky", "wunderlich")
 EXAMPLES = ("example1", "example2")
 SHELLS = ROOT / "tests" / "data" / "shell"
+SHAPES = ROOT / "docs" / "shapes.toml"
+APART = 0.2
 SHEET = 0.0007
 """Thickness of the source's sheet in U: 140 µm of 200 mm."""
 
@@ -52,6 +54,23 @@ def gentle_arc() -> dict[str, Any]:
     position, frame = helix(-1.5, 0.25)
     turn = Rotation.from_rotvec([0.05, 0.05, -0.1]) * frame
     return clamped(position + np.array([0.03, 0.02, 0.01]), turn.as_rotvec(), square_rib=False)
+
+
+@functools.cache
+def shapes() -> list[fb.Equilibrium]:
+    """The stable shapes of one board that do not pass through themselves, rising in energy."""
+    found = fb.branches(fb.load(SHAPES))
+    return [shape for shape in found if shape.stable and shape.crosses_itself is None]
+
+
+def apart(found: list[fb.Equilibrium], count: int) -> list[fb.Equilibrium]:
+    """The lowest of them that are apart from all lower ones, by a fifth of the length somewhere."""
+    chosen: list[fb.Equilibrium] = []
+    for shape in found:
+        moves = [np.linalg.norm(shape.position - lower.position, axis=1).max() for lower in chosen]
+        if min(moves, default=1.0) > APART:
+            chosen.append(shape)
+    return chosen[:count]
 
 
 @functools.cache

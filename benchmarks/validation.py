@@ -18,6 +18,7 @@ from cases import (
     ENERGIES,
     EXAMPLES,
     SHEET,
+    apart,
     clamped,
     closed,
     distance_to_shell,
@@ -27,6 +28,7 @@ from cases import (
     helix,
     orders,
     refine,
+    shapes,
     shell,
     shell_peak,
     solve,
@@ -64,6 +66,7 @@ SHELL_CASES = (
     "rounded_corner_h8",
 )
 GALLERY = ROOT / "docs" / "gallery.md"
+SHAPES = ROOT / "docs" / "shapes.md"
 MESHES = (40, 80, 160, 320, 640, 1280)
 REPETITIONS = 31
 
@@ -178,6 +181,24 @@ def gallery_rows() -> Iterator[list[str]]:
         ]
 
 
+def shape_rows() -> Iterator[list[str]]:
+    """The stable shapes of one board, those with a letter drawn."""
+    letters = dict(zip(map(id, apart(shapes(), 5)), "abcde", strict=True))
+    for shape in shapes():
+        radius, margin = shape.least_spine_radius, shape.snap_margin(reach=0.3)
+        assert radius is not None
+        assert margin is not None
+        yield [
+            letters.get(id(shape), ""),
+            number(shape.energy, 2),
+            number(shape.twist, 2),
+            number(radius.value, 4),
+            number(float(np.linalg.norm(shape.reaction("end").force)), 1),
+            number(margin.distance, 3),
+            "yes" if margin.snaps else "no",
+        ]
+
+
 def convergence_rows() -> Iterator[list[str]]:
     """Changes of the energy from mesh to mesh, with the observed order."""
     gentle = [refine(gentle_arc(), energy, MESHES) for energy in ("fishbone", "wunderlich")]
@@ -248,6 +269,8 @@ def main() -> None:
     write("published", table(header, published_rows()))
     header = ["scenario", "density", "energy", "least radius", "force at the start", "minimum", "iterations"]
     write("gallery", table(header, gallery_rows()), GALLERY)
+    header = ["shape", "energy", "twist", "least radius", "force", "margin", "snaps there"]
+    write("shapes", table(header, shape_rows()), SHAPES)
     header = [
         "elements",
         *(f"gentle arc, `{energy}`" for energy in ("fishbone", "wunderlich")),

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 import fishbone as fb
 import ritz
-from cases import ENERGIES, EXAMPLES, SHEET, distance_to_shell, example, gentle_arc, refine, shell, solve
+from cases import ENERGIES, EXAMPLES, SHEET, apart, distance_to_shell, example, gentle_arc, refine, shapes, shell, solve
 from fishbone import plot
 from fishbone.plot import VIEWER
 from tables import ROOT
@@ -153,6 +153,30 @@ def gallery(name: str) -> Figure:
     plot.draw_flat(flat, shape)
     flat.set(title="", xlabel="", ylabel="")
     flat.set_axis_off()
+    return figure
+
+
+def gallery_shapes() -> Figure:
+    """Five shapes of one board between the same clamps, and below them the flat boards with their ribs."""
+    figure = Figure(figsize=(WIDTH, 4.7), layout="constrained")
+    panels = figure.subfigures(2, 3).flat
+    drawn = apart(shapes(), 5)
+    for letter, panel, shape in zip("abcde", panels, drawn, strict=False):
+        radius, margin = shape.least_spine_radius, shape.snap_margin(reach=0.3)
+        assert radius is not None
+        assert margin is not None
+        axes = panel.subplots()
+        plot.draw_oblique(axes, shape)
+        force = np.linalg.norm(shape.reaction("end").force)
+        numbers = f"radius {radius.value:.3f}, force {force:.1f}, margin {margin.distance:.3f}"
+        axes.set_title(f"({letter}) energy {shape.energy:.2f}\n{numbers}", fontsize=7.5)
+    last = figure.subfigs[-1]
+    for letter, axes, shape in zip("abcde", last.subplots(5, 1), drawn, strict=True):
+        plot.draw_flat(axes, shape)
+        axes.set(title="", xlabel="", ylabel="")
+        axes.set_axis_off()
+        axes.text(-0.04, 0.0, f"({letter})", ha="right", va="center")
+    last.suptitle("ribs on the flat board", fontsize=7.5)
     return figure
 
 
@@ -310,6 +334,8 @@ def main() -> None:
     for name in GALLERY:
         with mpl.rc_context(STYLE | {"axes.grid": False, "savefig.dpi": 150.0}):
             save(gallery(name), f"gallery_{name}")
+    with mpl.rc_context(STYLE | {"axes.grid": False, "savefig.dpi": 150.0}):
+        save(gallery_shapes(), "gallery_shapes")
     for draw in (examples, convergence, bound, bend_radius, continuation, shell_thickness, collocation, locking):
         with mpl.rc_context(STYLE):
             save(draw(), draw.__name__)
