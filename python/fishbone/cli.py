@@ -138,7 +138,7 @@ def solve(  # noqa: PLR0913 - one for each option
 
 
 def _all(scenario: fishbone.Scenario) -> list[Equilibrium]:
-    with _progress(lambda done, planned: ("searching", done, planned)) as progress:
+    with _progress(lambda done, planned: ("searching", done, max(planned, 1))) as progress:
         return fishbone.branches(scenario, progress=progress)
 
 
@@ -361,6 +361,7 @@ def _progress(
             words, done, planned = read(count, amount)
             bar.update(task, description=words, completed=done, total=planned)
 
+        show(0, 0.0)
         yield show
 
 
