@@ -115,7 +115,7 @@ def test_of_mirror_twins_the_one_is_given_that_bulges_as_asked(arches, mirrored_
         assert other.negative_modes == one.negative_modes
         assert distance(one, other) < 10.0 * SAME
     for equilibria, side in ((arches, 1.0), (mirrored_arches, -1.0)):
-        for one in equilibria:
+        for one in equilibria[:4]:
             x = side * one.position[:, 0]
             assert x.max() >= -x.min() - SAME
 
