@@ -26,8 +26,9 @@ impl Watch for Counter {
     }
 
     fn tell(&self, done: usize, planned: usize) {
-        self.done.fetch_max(done, Ordering::Relaxed);
-        self.planned.fetch_max(planned, Ordering::Relaxed);
+        // In this order, so that no more is ever seen done than was planned.
+        self.planned.fetch_max(planned, Ordering::SeqCst);
+        self.done.fetch_max(done, Ordering::SeqCst);
     }
 }
 
@@ -70,7 +71,7 @@ pub(crate) fn branches(
 }
 
 fn tell(counter: &Counter, progress: Option<&Py<PyAny>>) -> PyResult<()> {
-    let [done, planned] = [&counter.done, &counter.planned].map(|n| n.load(Ordering::Relaxed));
+    let [done, planned] = [&counter.done, &counter.planned].map(|n| n.load(Ordering::SeqCst));
     Python::attach(|py| {
         py.check_signals()?;
         match progress {

@@ -4,9 +4,10 @@
 //! one of the lowest modes of an equilibrium, followed until it takes none, leads to another, of one index more or less; and
 //! from a saddle it is downhill to both sides.
 
-use crate::equilibrium::{Equilibrium, Status, is_settled, minimum_from, of_solution, program_of};
+use crate::equilibrium::{
+    Equilibrium, Status, is_settled, minimum_from, minimum_next_to, of_solution, program_of,
+};
 use crate::guess::{guess, waved};
-use crate::lie::Pose;
 use crate::program::{BeltPoint, BeltProgram};
 use crate::scenario::{Method, Scenario};
 use crate::solver::{self, Mode, Stationary};
@@ -69,6 +70,7 @@ pub fn branches(scenario: &Scenario, run: &Run, watch: &dyn Watch) -> Vec<Equili
     census.start();
     census.push();
     census.confirm();
+    census.face();
     let mut found = census.found;
     if found.is_empty() {
         return vec![first];
@@ -196,6 +198,47 @@ impl Census<'_> {
     }
 }
 
+impl Census<'_> {
+    /// Takes the mirror image of a minimum for it, where that meets the supports too and bulges more as asked.
+    fn face(&mut self) {
+        let found = std::mem::take(&mut self.found);
+        let watch = self.watch;
+        self.found = self.each(&found, |found| {
+            facing(found, &mut || watch.proceed()).unwrap_or_else(|| found.clone())
+        });
+    }
+}
+
+/// The mirror image that bulges most, where it does so more than the minimum itself.
+fn facing(
+    found: &Equilibrium,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Option<Equilibrium> {
+    /// Largest miss of the supports, lengths in U and angles in rad, that is rounding.
+    const ROUNDING: f64 = 1e-6;
+    const MIRRORS: [[f64; 2]; 3] = [[-1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]];
+    let solved = found.solved.as_ref()?;
+    let stable = found.stability.is_none_or(|s| s.negative_modes == 0);
+    let mirrored = MIRRORS
+        .into_iter()
+        .filter(|_| stable)
+        .filter_map(|[bend, slope]| {
+            let mut point = solved.at.point.clone();
+            for fields in &mut point.fields {
+                *fields = Vector2::new(bend * fields[0], slope * fields[1]);
+            }
+            solved.program.settle(&mut point);
+            let meets = solved.program.miss_of_supports(&point) < ROUNDING;
+            meets.then_some(point)
+        });
+    let twins = mirrored.filter_map(|point| {
+        let twin = minimum_next_to(&found.scenario, &point, proceed);
+        (twin.status == Status::Converged && is_twin(found, &twin)).then_some(twin)
+    });
+    let highest = twins.max_by(|a, b| height(a).total_cmp(&height(b)))?;
+    (height(&highest) > height(found) + 1e-9 * found.spine.length()).then_some(highest)
+}
+
 /// The same equilibrium on a mesh twice as fine; `None` where there is none like it.
 fn on_finer_mesh(
     found: &Equilibrium,
@@ -206,16 +249,7 @@ fn on_finer_mesh(
     const LEVEL: f64 = 0.02;
     let fine = found.refined(2 * found.scenario.elements(), proceed)?;
     let is_level = (fine.energy - found.energy).abs() <= LEVEL * found.energy.abs();
-    let length = found.spine.length();
-    let moves = |(u, pose): (&f64, &Pose)| {
-        let same = fine
-            .spine
-            .u
-            .partition_point(|other| *other < u - 1e-9 * length);
-        (fine.spine.pose[same].position - pose.position).norm() / length
-    };
-    let places = found.spine.u.iter().zip(&found.spine.pose);
-    (is_level && places.map(moves).fold(0.0, f64::max) <= NEAR).then_some(fine)
+    (is_level && found.displacement(&fine) <= NEAR).then_some(fine)
 }
 
 /// The modes along which an equilibrium is pushed.

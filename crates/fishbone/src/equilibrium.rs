@@ -8,8 +8,9 @@ mod search;
 
 use crate::belt::Belt;
 use crate::guess::{guess, waved};
+use crate::lie::Pose;
 use crate::program::{BeltPoint, BeltProgram};
-use crate::scenario::{BeltSpec, LinkSpec, Method, Scenario, SupportSpec};
+use crate::scenario::{BeltSpec, LinkSpec, Method, SAME_PLACE, Scenario, SupportSpec};
 use crate::solver::{self, Inertia, Residuals, Solution, Stationary};
 use crate::spine::Spine;
 use crate::stability::Stability;
@@ -129,6 +130,21 @@ impl Units {
 }
 
 impl Equilibrium {
+    /// The longest way in U from a node to the same place of the same belt in another shape.
+    pub(crate) fn displacement(&self, other: &Self) -> f64 {
+        let length = self.spine.length();
+        let u = &other.spine.u;
+        let way = |(at, pose): (&f64, &Pose)| {
+            let next = u.partition_point(|u| *u < at - SAME_PLACE * length);
+            let next = next.clamp(1, u.len() - 1);
+            let share = ((at - u[next - 1]) / (u[next] - u[next - 1])).clamp(0.0, 1.0);
+            let [a, b] = [next - 1, next].map(|k| other.spine.pose[k].position);
+            (a.lerp(&b, share) - pose.position).norm() / length
+        };
+        let places = self.spine.u.iter().zip(&self.spine.pose);
+        places.map(way).fold(0.0, f64::max)
+    }
+
     /// The same equilibrium, minimum or not, on a mesh of another number of elements; `None` where none is found next to it.
     ///
     /// `proceed` is asked once an iteration whether to go on.
@@ -137,15 +153,17 @@ impl Equilibrium {
         elements: usize,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Option<Self> {
+        /// Farther off, in U, it is another one.
+        const NEAR: f64 = 0.1;
         let solved = self.solved.as_ref()?;
         let mut scenario = self.scenario.clone();
         scenario.solver.elements = Some(elements);
         let program = program_of(&scenario, elements);
         let shape = search::prolong(&solved.program, &solved.at.point, &program);
         if self.stability.is_none_or(|s| s.negative_modes == 0) {
-            let belt = Belt::new(&scenario.belt)?;
-            let found = intrinsic::solve(&scenario, &belt, Start::Close(&shape), proceed);
-            return (found.status == Status::Converged).then_some(found);
+            let found = minimum_next_to(&scenario, &shape, proceed);
+            let is_near = self.displacement(&found) <= NEAR;
+            return (found.status == Status::Converged && is_near).then_some(found);
         }
         let (from, bounds) = (&solved.program, &solved.at.bound_multipliers);
         let at = Stationary {
@@ -240,6 +258,16 @@ pub(crate) fn minimum_from(
 ) -> Equilibrium {
     let belt = Belt::new(&scenario.belt).expect("a validated scenario");
     intrinsic::solve(scenario, &belt, Start::Shape(shape), proceed)
+}
+
+/// The minimum next to a shape on the scenario's mesh.
+pub(crate) fn minimum_next_to(
+    scenario: &Scenario,
+    shape: &BeltPoint,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Equilibrium {
+    let belt = Belt::new(&scenario.belt).expect("a validated scenario");
+    intrinsic::solve(scenario, &belt, Start::Close(shape), proceed)
 }
 
 /// The equilibrium of a solution that was found by other means.
