@@ -47,7 +47,7 @@ pub(super) fn solve(
     equilibrium(scenario, &assembly, found, status, message, twice)
 }
 
-/// The equilibrium of a solution that was found by other means, where its ribs are apart.
+/// The equilibrium of a solution that was found by other means; it has converged only where its ribs are apart.
 pub(super) fn of_solution(
     scenario: &Scenario,
     belt: &Belt,
@@ -56,7 +56,9 @@ pub(super) fn of_solution(
 ) -> Equilibrium {
     let assembly = Assembly::new(scenario, belt);
     let twice = said_twice(scenario, &program);
-    let (status, message) = judge(scenario, &solution, None, twice.as_deref());
+    let spine = assembly.spine(&program, &solution.at.point);
+    let crossing = unsettled(&program, &spine).map(|element| spine.u[element]);
+    let (status, message) = judge(scenario, &solution, crossing, twice.as_deref());
     let found = Found { program, solution };
     equilibrium(scenario, &assembly, found, status, message, twice)
 }
