@@ -10,8 +10,9 @@ use super::chain::NodeVector;
 use super::kkt::KktVector;
 use super::modes::{lowest_modes_of, moved};
 use super::push::pushed_over;
-use super::{BOUNDS, Kkt, Program, Residuals, Rows, Settings, Shape, Stationary, assess, minimise};
+use super::{BOUNDS, Kkt, Program, Residuals, Rows, Settings, Shape, Stationary};
 use super::{Mode, Solution};
+use super::{assess, larger, minimise};
 use std::ops::ControlFlow;
 
 /// Programmes by one parameter.
@@ -129,6 +130,8 @@ pub enum Events {
 pub struct Continuation<'a, F: Family> {
     family: &'a F,
     tolerance: f64,
+    /// What slack times multiplier may be, in multiples of the tolerance.
+    softness: f64,
     range: [f64; 2],
     pace: Pace,
 }
@@ -147,6 +150,7 @@ where
         Self {
             family,
             tolerance,
+            softness: 1.0,
             range,
             pace,
         }
@@ -188,7 +192,13 @@ where
                 break;
             }
             let step = self.advance(last, &mut length);
-            let Some(step) = step.or_else(|| self.hop(last, &mut length)) else {
+            let Some(step) = step.or_else(|| {
+                if std::env::var("NR").is_ok() {
+                    None
+                } else {
+                    self.round_kink(last, &mut length)
+                }
+            }) else {
                 curve.end = End::Lost;
                 break;
             };
@@ -294,7 +304,7 @@ where
         const SHARPEST: f64 = 0.9;
         loop {
             let step = self.step(last, &last.tangent, *length);
-            let shortest = *length < 2.0 * SHORTEST;
+            let shortest = *length < 2.0 * SHORTEST && self.softness == 1.0;
             let taken = step.filter(|next| {
                 let straight = last.cosine(next) > SHARPEST;
                 let apart = self.pace.events == Events::Ignore
@@ -333,30 +343,125 @@ where
         }
     }
 
-    /// The station a little way on in the parameter, where no step along the curve leads on: across a kink, where an inequality
-    /// is taken up or given up at once.
-    fn hop(&self, last: &Station<PointOf<F>>, length: &mut f64) -> Option<Step<PointOf<F>>> {
-        const FAR: [f64; 4] = [1e-5, 1e-4, 1e-3, 5e-3];
-        const NEAR: f64 = 0.02;
-        let [low, high] = self.range;
-        let onwards = last.tangent.parameter.signum();
-        let hopped = FAR.into_iter().find_map(|far| {
-            let mut at = last.at.clone();
-            let parameter = (last.parameter + far * onwards).clamp(low, high);
-            let arrival = self.correct(&mut at, parameter, None)?;
-            let station = self.station(at, arrival, None)?;
-            (station.at.point.distance(&last.at.point) < NEAR).then_some(station)
-        });
-        let mut station = hopped?;
-        if station.tangent.parameter.signum() != onwards {
-            station.tangent.turn_round();
-        }
+    /// The station beyond a kink, where an inequality is taken up or given up at once and no step along the curve leads on.
+    ///
+    /// With softer inequalities the curve is round there: it is followed until it is near enough to the sharp one again.
+    fn round_kink(&self, last: &Station<PointOf<F>>, length: &mut f64) -> Option<Step<PointOf<F>>> {
+        const SOFTER: [f64; 4] = [1e1, 1e2, 1e3, 1e4];
+        /// Where the soft curve is taken up: that far before the kink, as it cuts the corner.
+        const BACK: [f64; 2] = [3e-3, 1e-2];
+        let mut ways = SOFTER
+            .into_iter()
+            .flat_map(|softness| BACK.map(|back| (softness, back)));
+        let beyond = ways.find_map(|(softness, back)| self.beyond_kink(last, softness, back))?;
         *length = 0.1 * self.pace.longest;
+        let event = match self.pace.events {
+            Events::Ignore => None,
+            Events::Find | Events::EndAtFirst => self.event_at_kink(last, &beyond),
+        };
+        let [low, high] = self.range;
         Some(Step {
-            arrived: station.parameter <= low || station.parameter >= high,
-            station,
-            event: None,
+            arrived: beyond.parameter <= low || beyond.parameter >= high,
+            station: beyond,
+            event,
         })
+    }
+
+    /// The first station beyond a kink to which the curve with softer inequalities leads.
+    fn beyond_kink(
+        &self,
+        last: &Station<PointOf<F>>,
+        softness: f64,
+        back: f64,
+    ) -> Option<Station<PointOf<F>>> {
+        const FIRST: f64 = 1e-4;
+        const MOST: usize = 100;
+        let soft = self.softened(softness);
+        let [low, high] = self.range;
+        let before = self
+            .step(last, &last.tangent, -back)
+            .filter(|before| (low..=high).contains(&before.parameter))?;
+        let mut station = soft.step(&before, &before.tangent, 0.0)?;
+        let mut length = FIRST;
+        for _ in 0..MOST {
+            let step = soft.advance(&station, &mut length)?;
+            station = step.station;
+            let sharp = self.sharpened(&station, softness, step.arrived);
+            if step.arrived {
+                return sharp;
+            }
+            let sharp = sharp.filter(|sharp| self.leads_away(sharp, last));
+            if sharp.is_some() {
+                return sharp;
+            }
+        }
+        None
+    }
+
+    /// The station with the inequalities as they are, next to one with softer ones: square to the curve, or at its parameter.
+    fn sharpened(
+        &self,
+        from: &Station<PointOf<F>>,
+        softness: f64,
+        at_parameter: bool,
+    ) -> Option<Station<PointOf<F>>> {
+        const SHARPER: f64 = 0.1;
+        let mut station = from.clone();
+        let mut softness = softness;
+        while softness > 1.0 {
+            softness = (SHARPER * softness).max(1.0);
+            let sharper = self.softened(softness);
+            let mut at = station.at.clone();
+            let square = (!at_parameter).then_some((&from.tangent, 0.0));
+            let arrival = sharper.correct(&mut at, station.parameter, square)?;
+            station = sharper.station(at, arrival, Some(&from.tangent))?;
+        }
+        Some(station)
+    }
+
+    /// Whether the curve leads on from a station, and away from another.
+    fn leads_away(&self, from: &Station<PointOf<F>>, other: &Station<PointOf<F>>) -> bool {
+        const SHORT: f64 = 0.1;
+        let way = from.at.point.distance(&other.at.point);
+        let next = self.step(from, &from.tangent, (SHORT * way).max(SHORTEST));
+        next.is_some_and(|next| next.at.point.distance(&other.at.point) > way)
+    }
+
+    /// What happens at a kink.
+    fn event_at_kink(
+        &self,
+        before: &Station<PointOf<F>>,
+        beyond: &Station<PointOf<F>>,
+    ) -> Option<Event<PointOf<F>>> {
+        let turn = match before.turn_before(beyond)? {
+            Turn::Apex => Turn::Fold,
+            turn => turn,
+        };
+        let crossing = before.negative.min(beyond.negative) + 1;
+        let mode = self
+            .modes(before, crossing)?
+            .into_iter()
+            .nth(crossing - 1)?;
+        Some(Event {
+            turn,
+            parameter: before.parameter,
+            station: before.clone(),
+            negative: [before.negative, beyond.negative],
+            mode,
+        })
+    }
+
+    /// The same with softer inequalities, and no eye for events.
+    fn softened(&self, softness: f64) -> Self {
+        Self {
+            family: self.family,
+            softness,
+            pace: Pace {
+                events: Events::Ignore,
+                ..self.pace
+            },
+            ..*self
+        }
     }
 
     /// The station between two where the parameter has a value.
@@ -394,6 +499,8 @@ where
         const CLOSE: f64 = 1e-9;
         /// Where the last steps lead no nearer than this, what is sought need not be smooth in between.
         const SHARP: f64 = 1e-5;
+        /// Where to look instead, between the two, where no step leads to the place.
+        const SHARES: [f64; 5] = [0.5, 0.25, 0.75, 0.1, 0.9];
         let turn = from.turn_before(to)?;
         let crossing = from.negative.min(to.negative) + 1;
         // What changes its sign.
@@ -401,9 +508,13 @@ where
             let value = match turn {
                 Turn::Fold | Turn::Apex => station.tangent.parameter,
                 Turn::Bifurcation => {
-                    self.modes(&station, crossing)?
-                        .get(crossing - 1)?
-                        .eigenvalue
+                    let modes = self.modes(&station, crossing)?;
+                    let size = modes.get(crossing - 1)?.eigenvalue.abs();
+                    if station.negative < crossing {
+                        size
+                    } else {
+                        -size
+                    }
                 }
             };
             Some(Place {
@@ -427,10 +538,13 @@ where
             if is_close < CLOSE {
                 break;
             }
-            let Some(next) = self
-                .step(from, &from.tangent, next)
-                .and_then(|station| place(next, station))
-            else {
+            let aside = SHARES.map(|share| low.length + share * (high.length - low.length));
+            let mut nexts = std::iter::once(next).chain(aside);
+            let next = nexts.find_map(|next| {
+                let station = self.step(from, &from.tangent, next)?;
+                place(next, station)
+            });
+            let Some(next) = next else {
                 break;
             };
             // The end that stays a second time counts for less, lest it stay for ever.
@@ -494,6 +608,7 @@ where
     ) -> Option<Arrival> {
         const MOST: usize = 20;
         const ROUNDING: f64 = 1e-6;
+        const BY_SOFTNESS: f64 = 0.02;
         let mut left = along.map_or(0.0, |(_, length)| length);
         let mut aside = 0.0;
         for _ in 0..MOST {
@@ -502,7 +617,9 @@ where
             let barrier = self.barrier(&program);
             let missed = kkt.conditions(&at.bound_multipliers, barrier);
             let residuals = kkt.residuals(&missed, &at.bound_multipliers);
-            if residuals.largest() <= self.tolerance && left == 0.0 {
+            let is_met = larger(residuals.stationarity, residuals.constraint) <= self.tolerance
+                && kkt.is_centred(&at.bound_multipliers, barrier);
+            if is_met && left == 0.0 {
                 return Some(Arrival {
                     kkt,
                     parameter,
@@ -522,9 +639,14 @@ where
                 }
                 step.add(moved, &answer);
                 drift = Some(by_parameter);
-                let way = dot(&kkt.pull(&step.nodes), &step.nodes) + moved * moved;
+                let way = dot(&kkt.pull_by_slacks(&step.nodes), &step.nodes) + moved * moved;
                 aside += (way - left * left).max(0.0).sqrt();
-                if aside > length.abs().max(ROUNDING) {
+                let widest = if length == 0.0 {
+                    BY_SOFTNESS
+                } else {
+                    length.abs().max(ROUNDING)
+                };
+                if aside > widest {
                     return None;
                 }
             }
@@ -550,7 +672,7 @@ where
         let negative = arrival.kkt.negative();
         let motion = arrival.kkt.solve_nearly(&by_parameter).ok()?;
         let mut tangent = Tangent {
-            pull: arrival.kkt.pull(&motion.nodes),
+            pull: arrival.kkt.pull_by_slacks(&motion.nodes),
             motion,
             parameter: 1.0,
         };
@@ -590,7 +712,7 @@ where
     /// Half of what complementarity may be.
     fn barrier(&self, program: &F::Program) -> f64 {
         let heaviest = program.weights().into_iter().fold(0.0, f64::max);
-        0.5 * self.tolerance / heaviest
+        0.5 * self.softness * self.tolerance / heaviest
     }
 
     /// Whether the last of the stations is where the first was, some way on.

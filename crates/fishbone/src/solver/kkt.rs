@@ -189,6 +189,22 @@ impl Kkt {
         }
     }
 
+    /// Whether every slack times its multiplier is `barrier` times the stage's weight, to the order.
+    pub(super) fn is_centred(&self, bounds: &Bounds, barrier: f64) -> bool {
+        const LITTLE: f64 = 1e-3;
+        let stages = bounds.iter().zip(&self.values.slacks).zip(&self.weights);
+        let mut used =
+            stages
+                .zip(&self.stiffness)
+                .flat_map(|(((bounds, slacks), weight), stiffness)| {
+                    let pairs = bounds.iter().zip(slacks).zip(stiffness);
+                    pairs.filter(|(_, stiffness)| **stiffness != 0.0).map(
+                        move |((multiplier, slack), _)| multiplier * slack / (barrier * weight),
+                    )
+                });
+        used.all(|share| (share - 1.0).abs() <= LITTLE)
+    }
+
     /// Change of a slack along a motion, to first order.
     pub(super) fn slack_rate(&self, stage: usize, bound: usize, motion: &[NodeVector]) -> f64 {
         let by = &self.linear.slacks[stage][bound];
@@ -232,6 +248,23 @@ impl Kkt {
             pull
         };
         self.metric.iter().zip(motion).map(pull).collect()
+    }
+
+    /// The same, with the squares of the slacks' changes in it.
+    ///
+    /// Where a stage is about to be straight, its slacks change at hardly any motion.
+    pub(super) fn pull_by_slacks(&self, motion: &[NodeVector]) -> Vec<NodeVector> {
+        const SHARE: f64 = 0.1;
+        let mut pull = self.pull(motion);
+        for (k, weight) in self.weights.iter().enumerate() {
+            for b in 0..BOUNDS {
+                if self.stiffness[k][b] != 0.0 {
+                    let by_rate = SHARE * weight * self.slack_rate(k, b, motion);
+                    add_controls(&mut pull, k, &(by_rate * self.linear.slacks[k][b]));
+                }
+            }
+        }
+        pull
     }
 
     /// A vector of zeros.
