@@ -482,7 +482,8 @@ def test_the_table_of_follow_holds_all_digits(run, planar_file, turned):
     assert list(rows[0]) == list(table)
     for name in ("parameter", "energy", "supports[1].moment.z", "rib_margin"):
         assert [float(row[name]) for row in rows] == table[name].tolist()
-    assert [row["stable"] for row in rows] == [str(stable) for stable in table["stable"].tolist()]
+    stable = ["" if one is None else str(one) for one in table["stable"].tolist()]
+    assert [row["stable"] for row in rows] == stable
     assert [row["event"] for row in rows].count("fold") == 1
 
 

@@ -24,7 +24,7 @@ __version__: Final[str]
 _Row = list[float]
 _Status = Literal["converged", "infeasible", "not_converged"]
 _Kind = Literal["fold", "pitchfork", "transcritical", "bifurcation"]
-_End = Literal["range", "closed", "budget", "lost"]
+_End = Literal["range", "event", "closed", "budget", "lost"]
 _Floats = NDArray[np.float64]
 
 @final
@@ -138,7 +138,9 @@ class Diagram:
     def events(
         self, branch: int
     ) -> list[tuple[_Kind, float, int, tuple[int, int], tuple[float, Scenario, Equilibrium] | None]]: ...
-    def report(self, branch: int) -> tuple[_Floats, _Floats, _Floats, _Floats, _Floats, _Floats, _Floats, _Floats]: ...
+    def report(
+        self, branch: int
+    ) -> tuple[_Floats, _Floats, _Floats, _Floats, _Floats, _Floats, _Floats, _Floats, list[bool | None]]: ...
     def positions(self, branch: int) -> list[_Floats]: ...
     def equilibrium(self, branch: int, state: int) -> tuple[Scenario, Equilibrium]: ...
 

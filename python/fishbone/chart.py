@@ -22,8 +22,12 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Style = dict[str, Any]
 
-STABLE: Style = {"linestyle": "-", "linewidth": 1.3}
-UNSTABLE: Style = {"linestyle": (0, (3.0, 1.8)), "linewidth": 0.9}
+LINES: dict[bool | None, tuple[str, Style]] = {
+    True: ("stable", {"linestyle": "-", "linewidth": 1.3}),
+    False: ("unstable", {"linestyle": (0, (3.0, 1.8)), "linewidth": 0.9}),
+    None: ("undecided", {"linestyle": ":", "linewidth": 1.3}),
+}
+"""What a stretch is called and drawn with, by whether it is stable."""
 _MARKER: Style = {"linestyle": "", "markersize": 5.0, "markeredgecolor": "black", "markeredgewidth": 0.8, "zorder": 4}
 MARKERS: dict[Kind, Style] = {
     "fold": {"marker": "o", "markerfacecolor": "white", **_MARKER},
@@ -83,12 +87,12 @@ def draw(axes: Axes, diagram: Diagram, panel: Panel) -> bool:
     curves = [np.column_stack([branch.parameter, panel.along(branch)]) for branch in diagram.branches]
     for branch, curve, color in zip(diagram.branches, curves, colors(diagram), strict=True):
         for states, is_stable in runs(branch):
-            axes.plot(*curve[states].T, color=color, **(STABLE if is_stable else UNSTABLE))
+            axes.plot(*curve[states].T, color=color, **LINES[is_stable][1])
         if branch.origin is not None:
             # The first state is a little off the event.
             event = diagram.branches[branch.origin.branch].events[branch.origin.event]
             root = np.array([curves[branch.origin.branch][event.state], curve[0]])
-            axes.plot(*root.T, color=color, **(STABLE if branch.stable[0] else UNSTABLE))
+            axes.plot(*root.T, color=color, **LINES[branch.stable[0]][1])
         for event in branch.events:
             axes.plot(*curve[event.state], **MARKERS[event.kind])
     axes.set(ylabel=panel.label)
@@ -105,20 +109,22 @@ def draw(axes: Axes, diagram: Diagram, panel: Panel) -> bool:
     return bool(seen)
 
 
-def runs(branch: Branch) -> Iterator[tuple[slice, bool]]:
-    """The stretches of a branch that are stable throughout or not, as their states, each from one event to another.
+def runs(branch: Branch) -> Iterator[tuple[slice, bool | None]]:
+    """The stretches of a branch that are stable throughout, or not, or undecided, as their states.
 
-    The number of negative modes in the very state of an event is a matter of rounding: what counts is that before it
-    and beyond.
+    In the very state of an event that is a matter of rounding: what counts is what is before it and beyond.
     """
     behind, ahead = branch.negative_modes, branch.negative_modes
     for event in branch.events:
         behind[event.state], ahead[event.state] = event.negative_modes
-    is_stable = (ahead[:-1] == 0) & (behind[1:] == 0)
-    bounds = [0, *(np.flatnonzero(np.diff(is_stable)) + 1).tolist(), len(is_stable)]
-    for first, last in itertools.pairwise(bounds):
-        if first < last:
-            yield slice(first, last + 1), bool(is_stable[first])
+    falls = (ahead[:-1] > 0) | (behind[1:] > 0)
+    states = itertools.pairwise(branch.stable)
+    verdicts = [None if pair == (None, None) else not bool(down) for pair, down in zip(states, falls, strict=True)]
+    first = 0
+    for verdict, stretch in itertools.groupby(verdicts):
+        last = first + len(list(stretch))
+        yield slice(first, last + 1), verdict
+        first = last
 
 
 def colors(diagram: Diagram) -> list[Any]:
@@ -133,7 +139,7 @@ def key(diagram: Diagram, *, snaps: bool) -> Iterator[Line2D]:
     """What lines, markers and arrows mean, of those that the picture has."""
     stretches = {is_stable for branch in diagram.branches for _, is_stable in runs(branch)}
     kinds = {event.kind for branch in diagram.branches for event in branch.events}
-    for is_stable, label, style in ((True, "stable", STABLE), (False, "unstable", UNSTABLE)):
+    for is_stable, (label, style) in LINES.items():
         if is_stable in stretches:
             yield Line2D([], [], label=label, color="black", **style)
     for kind, style in MARKERS.items():

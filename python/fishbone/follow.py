@@ -33,7 +33,7 @@ MIN_STATES, MAX_STATES = 2, 100_000
 MAX_BRANCHES = 1000
 
 Kind = Literal["fold", "pitchfork", "transcritical", "bifurcation"]
-End = Literal["range", "closed", "budget", "lost"]
+End = Literal["range", "event", "closed", "budget", "lost"]
 
 
 class Poses(NamedTuple):
@@ -92,6 +92,7 @@ class _Report(NamedTuple):
     least_bend_radius: Floats
     least_spine_radius: Floats
     rib_margin: Floats
+    stable: list[bool | None]
 
 
 class Branch:
@@ -110,8 +111,8 @@ class Branch:
         self.origin: Origin | None = None if origin is None else Origin(*origin)
         """The event of another branch where it begins; None of the first, which begins with the path."""
         self.end: End = inner.end(index)
-        """Why it ends: with the path ("range"), where it began ("closed"), with `states` of `follow` ("budget"), or
-        because no step, however short, leads on ("lost")."""
+        """Why it ends: with the path ("range"), in another that it meets head on ("event"), where it began ("closed"),
+        with `states` of `follow` ("budget"), or because no step, however short, leads on ("lost")."""
         self.events: list[Event] = [_event(*event) for event in inner.events(index)]
         """Its events in order."""
 
@@ -151,12 +152,13 @@ class Branch:
         return np.array(self._inner.negative_modes(self._index), dtype=np.int64)
 
     @property
-    def stable(self) -> NDArray[np.bool_]:
-        """Whether there is no such motion; next to an event that is decided by rounding.
+    def stable(self) -> list[bool | None]:
+        """Whether each is a local minimum; None where that cannot be decided, as `Equilibrium.stable`.
 
-        Shapes: (m,).
+        That is next to an event, and where a good part of the belt is flat under load: there the slope of its ribs
+        costs nothing, and the second variation, which `negative_modes` counts, says nothing of them.
         """
-        return np.equal(self.negative_modes, 0)
+        return list(self._report.stable)
 
     @property
     def least_bend_radius(self) -> Floats:
@@ -439,7 +441,7 @@ def _columns(index: int, branch: Branch) -> Columns:
         "parameter": branch.parameter,
         "energy": branch.energy,
         "height": branch.height,
-        "stable": branch.stable,
+        "stable": np.array(branch.stable, dtype=object),
         "negative_modes": branch.negative_modes,
         "event": np.array(kinds),
     }

@@ -250,7 +250,7 @@ def _branches(diagram: Diagram) -> Table:
     for heading in ("stable", "parameter", "energy"):
         table.add_column(heading, justify="right")
     for index, branch in enumerate(diagram.branches):
-        stable = f"{np.count_nonzero(branch.stable)} of {len(branch)}"
+        stable = f"{branch.stable.count(True)} of {len(branch)}"
         table.add_row(
             str(index), _beginning(diagram, branch), stable, *map(_from_to, (branch.parameter, branch.energy))
         )

@@ -104,7 +104,8 @@ type Event = (
     Option<(f64, Scenario, Equilibrium)>,
 );
 
-/// Parameter, energy, height, forces and moments of the supports, least bend radius, least radius on the spine, rib margin.
+/// Parameter, energy, height, forces and moments of the supports, least bend radius, least radius on the spine, rib margin,
+/// and whether it is stable.
 type Report<'py> = (
     Scalars<'py>,
     Scalars<'py>,
@@ -114,6 +115,7 @@ type Report<'py> = (
     Scalars<'py>,
     Scalars<'py>,
     Scalars<'py>,
+    Vec<Option<bool>>,
 );
 
 #[pymethods]
@@ -202,6 +204,7 @@ impl Diagram {
             column(|s| s.least_bend_radius.unwrap_or(f64::NAN)),
             column(|s| s.least_spine_radius.unwrap_or(f64::NAN)),
             column(|s| s.rib_margin),
+            summaries.iter().map(Summary::stable).collect(),
         ))
     }
 

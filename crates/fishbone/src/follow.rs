@@ -428,6 +428,13 @@ fn kind(event: &solver::Event<BeltPoint>, crossing: &[Station<BeltPoint>]) -> Ki
     }
 }
 
+impl Summary {
+    /// Whether it is a local minimum; `None` where that cannot be decided.
+    pub fn stable(&self) -> Option<bool> {
+        self.stability?.is_stable()
+    }
+}
+
 impl State {
     fn of(station: &Station<BeltPoint>) -> Self {
         Self {
