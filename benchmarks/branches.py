@@ -4,14 +4,15 @@
 
 The scenarios are those of random_poses.py. A random shape has a bend and a rib slope that are sums of five cosines with
 random amplitudes and phases, up to the bend of a ring and slopes of a half, root mean square; it does not meet its
-supports. Every shape that `branches` finds is solved for again on a mesh twice as fine.
+supports. Every shape is solved for again on a mesh twice as fine; levels that are nearer to each other than what this
+changes of one of them are one: the mesh does not tell them apart.
 """
 
 from __future__ import annotations
 
 import argparse
 import time
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 POINTS = 161
 SAME_LEVEL = 1e-4
-"""Energies that differ by less than this share are one level."""
+"""Energies that differ by less than this share are one level in any case."""
 MESH, NEAR = 2e-2, 3e-2
 """What a mesh twice as fine may change of an energy, as a share, and of a shape, in U."""
 
@@ -45,28 +46,44 @@ def random_shape(rng: np.random.Generator) -> tuple[Floats, Floats]:
     return smooth_field(rng, rng.uniform(0.0, 2.0 * np.pi)), smooth_field(rng, rng.uniform(0.0, 0.5))
 
 
-def fine_energy(coarse: Equilibrium) -> float | None:
-    """Energy of the same equilibrium on a mesh twice as fine; None where that has none like it."""
+class Level(NamedTuple):
+    """An energy, and how well the mesh tells it."""
+
+    coarse: float
+    fine: float
+
+    def is_same(self, other: Level) -> bool:
+        """Whether the two are one level."""
+        known = max(abs(level.fine - level.coarse) for level in (self, other))
+        return abs(self.fine - other.fine) <= max(SAME_LEVEL * abs(self.fine), known)
+
+
+def level(coarse: Equilibrium) -> Level | None:
+    """The level of an equilibrium; None where a mesh twice as fine has none like it."""
     fine = coarse.refined(2 * (len(coarse.u) - 1))
     if fine is None or abs(fine.energy - coarse.energy) > MESH * abs(coarse.energy):
         return None
     apart = np.linalg.norm(fine.position[::2] - coarse.position, axis=1)
-    return None if np.max(apart) > NEAR else fine.energy
+    return None if np.max(apart) > NEAR else Level(coarse.energy, fine.energy)
 
 
-def random_levels(scenario: Scenario, rng: np.random.Generator, guesses: int) -> list[Equilibrium]:
-    """Minima that searches from random shapes find, one of each level."""
+def random_minima(scenario: Scenario, rng: np.random.Generator, guesses: int) -> list[Equilibrium]:
+    """Minima that searches from random shapes find, one of each energy."""
     found = [fb.solve(scenario, start=random_shape(rng)) for _ in range(guesses)]
     distinct: list[Equilibrium] = []
     for minimum in sorted((e for e in found if e.status == "converged" and e.stable), key=lambda e: e.energy):
-        if not distinct or not is_level(minimum.energy, distinct[-1].energy):
+        if not distinct or minimum.energy - distinct[-1].energy > SAME_LEVEL * abs(minimum.energy):
             distinct.append(minimum)
     return distinct
 
 
-def is_level(energy: float, other: float) -> bool:
-    """Whether two energies are one level."""
-    return abs(energy - other) <= SAME_LEVEL * abs(energy)
+def apart(levels: list[Level]) -> list[Level]:
+    """One of each that are the same."""
+    distinct: list[Level] = []
+    for one in levels:
+        if not any(one.is_same(other) for other in distinct):
+            distinct.append(one)
+    return distinct
 
 
 def main() -> None:
@@ -83,20 +100,22 @@ def main() -> None:
         began = time.perf_counter()
         branches = fb.branches(scenario)
         took = time.perf_counter() - began
-        by_chance = random_levels(scenario, rng, options.guesses)
-        fine_of = {id(e): fine_energy(e) for e in (*branches, *by_chance)}
-        known = [energy for b in branches if (energy := fine_of[id(b)]) is not None]
-        true = [e for e in by_chance if fine_of[id(e)] is not None]
-        lost = [e.energy for e in true if not any(is_level(fine_of[id(e)] or 0.0, energy) for energy in known)]
-        doubtful = [b.energy for b in branches if fine_of[id(b)] is None]
-        total["levels"] += len(true)
+        by_chance = random_minima(scenario, rng, options.guesses)
+        levels, chance_levels = [level(b) for b in branches], [level(e) for e in by_chance]
+        known = [one for one in levels if one is not None]
+        true = [one for one in chance_levels if one is not None]
+        lost = [one.coarse for one in true if not any(one.is_same(other) for other in known)]
+        doubtful = [b.energy for b, one in zip(branches, levels, strict=True) if one is None]
+        distinct = len(apart(true))
+        total["levels"] += distinct
         total["of the mesh"] += len(by_chance) - len(true)
         total["missed"] += len(lost)
         total["branches"] += len(branches)
         total["unconfirmed"] += len(doubtful)
+        minima = sum(b.stable is not False for b in branches)
         print(
-            f"{index:3d} {scenario.to_dict()['energy']:10s} {took:5.1f} s, {len(branches)} branches, negative modes "
-            f"{[b.negative_modes for b in branches]}; random levels {len(true)} of {len(by_chance)}, "
+            f"{index:3d} {scenario.to_dict()['energy']:10s} {took:5.1f} s, "
+            f"{minima} minima and {len(branches) - minima} saddles; random levels {distinct}, minima {len(true)} of {len(by_chance)}, "
             f"missed {np.round(lost, 3)}, unconfirmed {np.round(doubtful, 3)}",
             flush=True,
         )
@@ -104,7 +123,7 @@ def main() -> None:
         ["scenarios", str(options.count)],
         ["random searches of each", str(options.guesses)],
         ["levels that they find", str(total["levels"])],
-        ["others that they find, which a mesh twice as fine does not have", str(total["of the mesh"])],
+        ["minima that they find and a mesh twice as fine does not have", str(total["of the mesh"])],
         ["levels that `branches` misses", str(total["missed"])],
         ["what `branches` finds", str(total["branches"])],
         ["of these not confirmed by a mesh twice as fine", str(total["unconfirmed"])],

@@ -15,8 +15,9 @@ from matplotlib.figure import Figure
 
 import fishbone as fb
 import ritz
+import shear
 from cases import ENERGIES, EXAMPLES, SHEET, apart, distance_to_shell, example, gentle_arc, refine, shapes, shell, solve
-from fishbone import plot
+from fishbone import chart, plot
 from fishbone.plot import VIEWER
 from tables import ROOT
 
@@ -270,6 +271,31 @@ def continuation() -> Figure:
     return plot.diagram(fb.follow(fb.Scenario.from_dict(tables), {"loads.points[0].force[1]": -100.0}))
 
 
+def shear_diagrams() -> Figure:
+    """Height of sheared bands: their equilibria, and what they do when they are led there and back."""
+    figure = Figure(figsize=(WIDTH, 8.6), layout="constrained")
+    rows = figure.subplots(len(shear.RATIOS), len(ENERGIES), sharex=True, sharey="row")
+    ways = (("there", slice(None, shear.STEPS + 1), "0.78", 5.0), ("back", slice(shear.STEPS, None), "0.55", 2.2))
+    for ratio, row in zip(shear.RATIOS, rows, strict=True):
+        for energy, axes in zip(ENERGIES, row, strict=True):
+            led = shear.swing(ratio, energy)
+            for label, way, color, width in ways:
+                axes.plot(led.z[way], led.height[way], color=color, linewidth=width, label=label)
+            for branch in shear.diagram(ratio, energy).branches:
+                for states, is_stable in chart.runs(branch):
+                    name, style = chart.LINES[is_stable]
+                    axes.plot(branch.parameter[states], branch.height[states], color="black", label=name, **style)
+            axes.set(xlim=(0.0, shear.FARTHEST))
+        row[0].set_ylabel(f"V/U = 1/{ratio}\nhighest x [U]")
+    for energy, axes in zip(ENERGIES, rows[0], strict=True):
+        axes.set_title(energy)
+    for axes in rows[-1]:
+        axes.set_xlabel("z of the far clamp [U]")
+    labels = {label: line for axes in rows.flat for line, label in zip(*axes.get_legend_handles_labels(), strict=True)}
+    figure.legend(labels.values(), labels.keys(), loc="outside lower center", ncols=4)
+    return figure
+
+
 # ------------------------------------------------------------------------------------------------------------- shell
 
 
@@ -336,7 +362,17 @@ def main() -> None:
             save(gallery(name), f"gallery_{name}")
     with mpl.rc_context(STYLE | {"axes.grid": False, "savefig.dpi": 150.0}):
         save(gallery_shapes(), "gallery_shapes")
-    for draw in (examples, convergence, bound, bend_radius, continuation, shell_thickness, collocation, locking):
+    for draw in (
+        examples,
+        convergence,
+        bound,
+        bend_radius,
+        continuation,
+        shear_diagrams,
+        shell_thickness,
+        collocation,
+        locking,
+    ):
         with mpl.rc_context(STYLE):
             save(draw(), draw.__name__)
 

@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 import fishbone as fb
 import planar
 from conftest import ROOT
+from folds import FOLDS, Expected
 
 ANGLE = "supports[1].rotation[2]"
 PUSH = "loads.points[0].force[1]"
@@ -35,11 +36,6 @@ def strut() -> fb.Scenario:
     return fb.Scenario.from_dict(tables)
 
 
-def reference(distance: float, angle: float) -> planar.Planar:
-    start = planar.buckled(distance)
-    return planar.at_parameter(start, math.copysign(1.0, angle) * planar.TURN, abs(angle)) if angle else start
-
-
 @pytest.fixture(scope="module")
 def buckling() -> fb.Diagram:
     return fb.follow(strut(), {PUSH: -100.0})
@@ -54,25 +50,34 @@ def sheared() -> fb.Diagram:
 # ------------------------------------------------------------------------------------------------------ events
 
 
-@pytest.mark.parametrize(
-    ("distance", "angle", "along", "field", "last"),
-    [
-        (0.6, 0.0, -planar.TURN, ANGLE, -1.5),
-        (0.8, 0.0, -planar.TURN, ANGLE, -1.5),
-        (0.9, 0.0, -planar.TURN, ANGLE, -1.5),
-        (0.6, -0.5, planar.ALONG_X, "supports[1].position[0]", 0.7),
-        (0.6, -0.5, -planar.ALONG_X, "supports[1].position[0]", -0.5),
-    ],
-)
-def test_fold_is_where_the_planar_reference_has_it(distance, angle, along, field, last):
-    expected = next(planar.folds(reference(distance, angle), along))
-    diagram = fb.follow(arch(distance, angle), {field: last}, branches=1)
-    fold = diagram.branches[0].events[0]
-    parameter = float(expected.pose @ np.abs(along))
-    assert (fold.kind, fold.negative_modes) == ("fold", (0, 1))
-    assert fold.parameter == pytest.approx(parameter, abs=1e-4)
-    assert diagram.branches[0].energy[fold.state] == pytest.approx(expected.state.energy, rel=1e-4)
-    assert diagram.branches[0].height[fold.state] == pytest.approx(expected.state.height, abs=1e-4)
+def towards(expected: Expected) -> tuple[fb.Scenario, dict[str, float]]:
+    """A stable shape on the branch of a fold, and a path on which the fold lies."""
+    field = ("supports[1].position[0]", "", ANGLE)[expected.component]
+    if expected.mode == 2:
+        # The S, drawn out so far to the other side that it is stable.
+        tables = arch(expected.distance).to_dict()
+        tables["supports"][1]["position"][0] = -1.02 * expected.parameter
+        return fb.Scenario.from_dict(tables), {field: 1.1 * expected.parameter}
+    if expected.nth == 1:
+        return arch(expected.distance, 1.6), {field: -1.6}
+    return arch(expected.distance, expected.turned), {field: expected.parameter + 0.1 * sum(expected.direction)}
+
+
+@pytest.mark.parametrize("expected", FOLDS, ids=lambda expected: expected.name)
+def test_fold_is_where_the_planar_reference_has_it(expected):
+    [branch] = fb.follow(*towards(expected), states=100, branches=1).branches
+    fold = next(event for event in branch.events if event.negative_modes == expected.modes)
+    assert fold.kind == "fold"
+    assert fold.parameter == pytest.approx(expected.parameter, abs=1e-4)
+    assert branch.energy[fold.state] == pytest.approx(expected.energy, rel=1e-4)
+    assert branch.height[fold.state] == pytest.approx(expected.height, abs=1e-4)
+    # Until then the belt gives way out of its plane nowhere: what there is, is of the plane.
+    earlier = branch.events[: branch.events.index(fold)]
+    assert len(earlier) == expected.modes[0]
+    for event in earlier:
+        mode = branch.equilibrium(event.state).modes(event.negative_modes[0] + 1)[-1]
+        across = np.abs(mode.translation[:, 2]).max()
+        assert across < 1e-3 * np.abs(mode.translation).max()
 
 
 def test_arch_turned_back_folds_at_a_number_that_anyone_can_check(turned):

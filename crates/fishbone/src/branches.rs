@@ -1,8 +1,9 @@
 //! All equilibria of a scenario that can be found: many starts, then pushes from each that is found to others.
 //!
-//! The starts are arches to either side with waves of bend and of rib slope laid over them, and lead to minima. A push along
-//! one of the lowest modes of an equilibrium, followed until it takes none, leads to another, of one index more or less; and
-//! from a saddle it is downhill to both sides.
+//! The starts are arches to either side with waves of bend and of rib slope laid over them, and lead to minima. From each
+//! minimum that is displaced along its lowest modes it is downhill to others. A push along one of the lowest modes of an
+//! equilibrium, followed until it takes none, leads to another, of one index more or less; and from a saddle it is downhill
+//! to both sides.
 
 use crate::equilibrium::{
     Equilibrium, Status, is_settled, minimum_from, minimum_next_to, of_solution, program_of,
@@ -11,13 +12,17 @@ use crate::guess::{guess, waved};
 use crate::program::{BeltPoint, BeltProgram};
 use crate::scenario::{Method, Scenario};
 use crate::solver::{self, Mode, Stationary};
-use crate::twins::are_twins;
+use crate::twins::{SAME, are_twins};
 use nalgebra::{Vector2, Vector3};
 use std::f64::consts::PI;
 use std::ops::ControlFlow;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+/// Most minima that are kicked.
+const KICKED: usize = 128;
+/// Modes along which a minimum is kicked.
+const KICKED_MODES: usize = 4;
 /// Most equilibria that are pushed.
 const PUSHED: usize = 16;
 /// So many at a time, so that lower ones that are found meanwhile come first.
@@ -68,6 +73,7 @@ pub fn branches(scenario: &Scenario, run: &Run, watch: &dyn Watch) -> Vec<Equili
     };
     census.enter(first.clone());
     census.start();
+    census.kick();
     census.push();
     census.confirm();
     census.face();
@@ -144,7 +150,35 @@ impl Census<'_> {
         }
     }
 
-    /// Kicks and pushes what was found along its lowest modes, the lowest in energy first, and what is found so in turn.
+    /// Kicks the minima along their lowest modes, the lowest in energy first, and what is found so in turn; of those that
+    /// are alike one.
+    fn kick(&mut self) {
+        let mut kicked: Vec<Equilibrium> = Vec::new();
+        while kicked.len() < KICKED {
+            self.found.sort_by(|a, b| a.energy.total_cmp(&b.energy));
+            let before = kicked.len();
+            for minimum in self.found.iter().filter(|e| e.stable() == Some(true)) {
+                if kicked.len() < KICKED && !kicked.iter().any(|known| is_like(known, minimum)) {
+                    kicked.push(minimum.clone());
+                }
+            }
+            let next = &kicked[before..];
+            if next.is_empty() {
+                return;
+            }
+            let (scenario, watch) = (self.scenario, self.watch);
+            let found = self.each(next, |minimum| {
+                let modes = lowest_modes(minimum, KICKED_MODES);
+                let kick = |mode: &Mode| kicked_along(scenario, minimum, mode, watch);
+                modes.iter().flat_map(kick).collect::<Vec<_>>()
+            });
+            for equilibrium in found.into_iter().flatten() {
+                self.enter(equilibrium);
+            }
+        }
+    }
+
+    /// Pushes what was found along its lowest modes, the lowest in energy first, and what is found so in turn.
     fn push(&mut self) {
         let mut pushed: Vec<f64> = Vec::new();
         while pushed.len() < PUSHED {
@@ -156,7 +190,10 @@ impl Census<'_> {
                 return;
             }
             pushed.extend(next.iter().map(|equilibrium| equilibrium.energy));
-            let modes = self.each(&next, lowest_modes);
+            let modes = self.each(&next, |equilibrium| {
+                let index = equilibrium.stability.map_or(0, |s| s.negative_modes);
+                lowest_modes(equilibrium, PUSHED_MODES[index.min(HIGHEST_INDEX)])
+            });
             let tasks: Vec<_> = next
                 .iter()
                 .zip(&modes)
@@ -167,9 +204,7 @@ impl Census<'_> {
                 .collect();
             let (scenario, watch) = (self.scenario, self.watch);
             let found = self.each(&tasks, |(equilibrium, mode, forth)| {
-                let mut found = kicked(scenario, equilibrium, mode, *forth, watch);
-                found.extend(pushed_over(scenario, equilibrium, mode, *forth, watch));
-                found
+                pushed_over(scenario, equilibrium, mode, *forth, watch)
             });
             for equilibrium in found.into_iter().flatten() {
                 self.enter(equilibrium);
@@ -179,19 +214,26 @@ impl Census<'_> {
 }
 
 impl Census<'_> {
-    /// Keeps what a mesh twice as fine has too, each once.
+    /// Keeps what a mesh twice as fine has too; of those that the mesh does not tell apart the lowest.
     fn confirm(&mut self) {
-        let found = std::mem::take(&mut self.found);
+        let mut found = std::mem::take(&mut self.found);
+        found.sort_by(|a, b| a.energy.total_cmp(&b.energy));
         let watch = self.watch;
         let fine = self.each(&found, |found| {
             on_finer_mesh(found, &mut || watch.proceed())
         });
-        let mut known: Vec<Equilibrium> = Vec::new();
+        let mut known: Vec<(Equilibrium, f64)> = Vec::new();
         for (found, fine) in found.into_iter().zip(fine) {
-            if let Some(fine) = fine
-                && !known.iter().any(|known| is_twin(known, &fine))
-            {
-                known.push(fine);
+            let Some(fine) = fine else {
+                continue;
+            };
+            let change = (fine.energy - found.energy).abs();
+            let is_known = |(known, own): &(Equilibrium, f64)| {
+                let is_level = (known.energy - fine.energy).abs() <= change.max(*own);
+                is_twin(known, &fine) || (is_level && is_like(known, &fine))
+            };
+            if !known.iter().any(is_known) {
+                known.push((fine, change));
                 self.found.push(found);
             }
         }
@@ -244,18 +286,13 @@ fn on_finer_mesh(
     found: &Equilibrium,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Option<Equilibrium> {
-    /// Farther off, in U, and with another energy, as a share, it is another one.
-    const NEAR: f64 = 0.03;
-    const LEVEL: f64 = 0.02;
     let fine = found.refined(2 * found.scenario.elements(), proceed)?;
     let is_level = (fine.energy - found.energy).abs() <= LEVEL * found.energy.abs();
     (is_level && found.displacement(&fine) <= NEAR).then_some(fine)
 }
 
-/// The modes along which an equilibrium is pushed.
-fn lowest_modes(equilibrium: &Equilibrium) -> Vec<Mode> {
-    let index = equilibrium.stability.map_or(0, |s| s.negative_modes);
-    let count = PUSHED_MODES[index.min(HIGHEST_INDEX)];
+/// The lowest modes of an equilibrium.
+fn lowest_modes(equilibrium: &Equilibrium, count: usize) -> Vec<Mode> {
     let solved = equilibrium.solved.as_ref().filter(|_| count > 0);
     let modes = solved.and_then(|solved| {
         solver::lowest_modes(&solved.program, &mut solved.at.clone(), count).ok()
@@ -263,19 +300,17 @@ fn lowest_modes(equilibrium: &Equilibrium) -> Vec<Mode> {
     modes.unwrap_or_default()
 }
 
-/// The minima that are found from where an equilibrium has been displaced far along a mode.
-fn kicked(
+/// The minima that are found from where one has been displaced far along a mode.
+fn kicked_along(
     scenario: &Scenario,
     from: &Equilibrium,
     mode: &Mode,
-    forth: bool,
     watch: &dyn Watch,
 ) -> Vec<Equilibrium> {
-    const FAR: [f64; 2] = [0.1, 0.3];
-    let sign = if forth { 1.0 } else { -1.0 };
+    const FAR: [f64; 4] = [0.1, -0.1, 0.3, -0.3];
     let solved = from.solved.iter();
     let starts = solved.flat_map(|solved| {
-        FAR.map(|far| solver::moved(&solved.program, &solved.at.point, mode, sign * far))
+        FAR.map(|far| solver::moved(&solved.program, &solved.at.point, mode, far))
     });
     starts
         .map(|start| minimum_from(scenario, &start, &mut || watch.proceed()))
@@ -325,15 +360,30 @@ fn downhill(
         .collect()
 }
 
+/// Whether two are the same.
 fn is_twin(a: &Equilibrium, b: &Equilibrium) -> bool {
-    /// Share of the energy by which twins may differ.
-    const SAME: f64 = 1e-4;
-    let poses = |e: &Equilibrium| Some(e.solved.as_ref()?.at.point.poses.clone());
-    let is_level = (a.energy - b.energy).abs() <= SAME * a.energy.abs().max(b.energy.abs());
-    let is_like = a.stability.map(|s| s.negative_modes) == b.stability.map(|s| s.negative_modes);
-    let shapes = poses(a).zip(poses(b));
-    is_level && is_like && shapes.is_some_and(|(a, b)| are_twins(&a, &b))
+    const SAME_LEVEL: f64 = 1e-4;
+    is_within(a, b, SAME_LEVEL, SAME)
 }
+
+/// Whether two may be the same but for the mesh.
+fn is_like(a: &Equilibrium, b: &Equilibrium) -> bool {
+    is_within(a, b, LEVEL, NEAR)
+}
+
+/// Whether two differ by no more than a share of the energy and a distance in U, and in no number of negative modes.
+fn is_within(a: &Equilibrium, b: &Equilibrium, share: f64, distance: f64) -> bool {
+    let solved = || Some((a.solved.as_ref()?, b.solved.as_ref()?));
+    let is_level = (a.energy - b.energy).abs() <= share * a.energy.abs().max(b.energy.abs());
+    let index = |e: &Equilibrium| e.stability.map(|s| s.negative_modes);
+    is_level
+        && index(a) == index(b)
+        && solved().is_some_and(|(a, b)| are_twins(&a.at.point.poses, &b.at.point.poses, distance))
+}
+
+/// With energies that differ by more than this share, or farther off, in U, two are not the same on different meshes.
+const LEVEL: f64 = 0.02;
+const NEAR: f64 = 0.03;
 
 /// How far an equilibrium bulges as its scenario asks.
 fn height(equilibrium: &Equilibrium) -> f64 {
@@ -382,7 +432,7 @@ const BENDS: [(f64, f64); 9] = [
 /// Waves of rib slope: half waves along the belt, and amplitude.
 const SLOPES: [(f64, f64); 5] = [(1.0, 0.0), (1.0, 0.5), (1.0, -0.5), (2.0, 0.5), (2.0, -0.5)];
 /// Number of sums of waves.
-const SUMS: usize = 4000;
+const SUMS: usize = 2000;
 /// Number of waves in each.
 const WAVES: usize = 5;
 
@@ -393,7 +443,7 @@ struct Sum {
 }
 
 impl Sum {
-    /// The i-th of a sequence that covers all evenly: bends up to that of a ring and slopes up to 0.5, root mean square.
+    /// The i-th of a sequence that covers all evenly: bends up to one and a half times that of a ring and slopes up to 0.5, root mean square.
     ///
     /// Source: M. Roberts, "The unreasonable effectiveness of quasirandom sequences" (2018).
     fn new(i: usize) -> Self {
@@ -408,7 +458,7 @@ impl Sum {
             ratio /= root;
             (0.5 + (i as f64 + 1.0) * ratio).fract()
         };
-        let sizes = [2.0 * PI * next(), 0.5 * next()];
+        let sizes = [3.0 * PI * next(), 0.5 * next()];
         let waves = sizes.map(|size| {
             let mut waves = [(0.0, 0.0); WAVES];
             for wave in &mut waves {

@@ -9,7 +9,7 @@ use crate::solver::{
 };
 use crate::stability::Stability;
 use crate::surface;
-use crate::twins::are_twins;
+use crate::twins::{SAME, are_twins};
 use nalgebra::Vector3;
 use std::ops::ControlFlow;
 use thiserror::Error;
@@ -364,7 +364,7 @@ impl Search<'_, '_> {
         let mut different: Vec<Station<BeltPoint>> = Vec::new();
         for station in stations {
             let is_twin = |other: &&mut Station<BeltPoint>| {
-                are_twins(&other.at.point.poses, &station.at.point.poses)
+                are_twins(&other.at.point.poses, &station.at.point.poses, SAME)
             };
             match different.iter_mut().find(is_twin) {
                 Some(twin) if reach(&station) > reach(twin) => *twin = station,
