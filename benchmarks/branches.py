@@ -115,7 +115,8 @@ def main() -> None:
         minima = sum(b.stable is not False for b in branches)
         print(
             f"{index:3d} {scenario.to_dict()['energy']:10s} {took:5.1f} s, "
-            f"{minima} minima and {len(branches) - minima} saddles; random levels {distinct}, minima {len(true)} of {len(by_chance)}, "
+            f"{minima} minima and {len(branches) - minima} saddles; "
+            f"random levels {distinct}, minima {len(true)} of {len(by_chance)}, "
             f"missed {np.round(lost, 3)}, unconfirmed {np.round(doubtful, 3)}",
             flush=True,
         )
