@@ -214,14 +214,24 @@ def lines_of(axes, style):
     return [line.get_xydata() for line in axes.lines if line.get_linestyle() == style and len(line.get_xydata()) > 1]
 
 
-def test_a_diagram_shows_energy_height_and_force_over_the_parameter(turned):
+ALWAYS = ["tightest bend\n[1/length]", "rib margin\n[1/length]"]
+"""What is shown last of any belt."""
+
+
+def test_a_diagram_shows_what_a_report_on_a_path_tells(turned):
     figure = plot.diagram(turned)
     [branch] = turned.branches
     force = np.linalg.norm(branch.reaction("end").force, axis=1)
-    assert [axes.get_ylabel() for axes in figure.axes] == ["energy", "height [length]", "|force| of supports[1]"]
+    values_of = (branch.energy, branch.height, force, 1.0 / branch.least_spine_radius, branch.rib_margin)
+    assert [axes.get_ylabel() for axes in figure.axes] == [
+        "energy",
+        "height [length]",
+        "|force| of supports[1]",
+        *ALWAYS,
+    ]
     assert figure.axes[-1].get_xlabel() == turned.parameter_name
     assert figure.get_figwidth() == 7.0
-    for axes, values in zip(figure.axes, (branch.energy, branch.height, force), strict=True):
+    for axes, values in zip(figure.axes, values_of, strict=True):
         [solid], [dashed] = lines_of(axes, "-"), lines_of(axes, "--")
         points = np.column_stack([branch.parameter, values])
         fold = branch.events[0].state
@@ -268,7 +278,7 @@ def test_snaps_of_a_diagram_lie_within_its_panels(turned):
 
 
 def test_the_force_of_a_diagram_is_that_of_the_support_asked_for(turned):
-    axes = plot.diagram(turned, support="start").axes[-1]
+    axes = plot.diagram(turned, support="start").axes[2]
     assert axes.get_ylabel() == "|force| of supports[0]"
     with pytest.raises(fb.NoSupport):
         plot.diagram(turned, support=7)
@@ -276,7 +286,7 @@ def test_the_force_of_a_diagram_is_that_of_the_support_asked_for(turned):
 
 def test_a_diagram_of_a_belt_without_supports_has_no_force():
     diagram = fb.follow(fb.load(ROOT / "scenarios" / "mobius.toml"), {"belt.width": 0.18}, branches=1)
-    assert [axes.get_ylabel() for axes in plot.diagram(diagram).axes] == ["energy", "height [length]"]
+    assert [axes.get_ylabel() for axes in plot.diagram(diagram).axes] == ["energy", "height [length]", *ALWAYS]
 
 
 @pytest.mark.parametrize("suffix", [".png", ".pdf"])

@@ -63,7 +63,7 @@ class Panel(NamedTuple):
 
 
 def panels(diagram: Diagram, support: Place | None) -> Iterator[Panel]:
-    """Energy, height, and the force of a support where there is one.
+    """Energy, height, the force of a support where there is one, tightest bend on the spine, and rib margin.
 
     Errors: `NoSupport`.
     """
@@ -80,6 +80,12 @@ def panels(diagram: Diagram, support: Place | None) -> Iterator[Panel]:
             lambda branch: np.linalg.norm(branch.reaction(index).force, axis=1),
             lambda shape: float(np.linalg.norm(shape.reaction(index).force)),
         )
+    yield Panel(
+        "tightest bend\n[1/length]",
+        lambda branch: np.nan_to_num(1.0 / branch.least_spine_radius),
+        lambda shape: 0.0 if shape.least_spine_radius is None else 1.0 / shape.least_spine_radius.value,
+    )
+    yield Panel("rib margin\n[1/length]", lambda branch: branch.rib_margin, lambda shape: float(shape.rib_margin.value))
 
 
 def draw(axes: Axes, diagram: Diagram, panel: Panel) -> bool:

@@ -88,7 +88,7 @@ _METADATA: dict[str, dict[str, Any]] = {
 _X, _Y, _Z = 0, 1, 2
 _WIDTH, _DECORATION, _GRAPHS, _KEY = 7.0, 0.6, 2.0, 0.55
 """Page width, and heights of what surrounds the views, of the graphs and of the key [in]."""
-_PANEL = 1.9
+_PANEL = 1.4
 """Height of a panel of a diagram [in]."""
 _FLAT_HEIGHTS = (0.35, 2.4)
 SHOWN = 12
@@ -158,11 +158,11 @@ def overview(equilibria: Sequence[Equilibrium], viewer: ArrayLike = VIEWER) -> F
 
 
 def diagram(diagram: Diagram, support: Place | None = None) -> Figure:
-    """Energy, height and the force of a support over the parameter: lines of stable states are solid, others dashed.
+    """Energy, height, force of a support, tightest bend and rib margin over the parameter.
 
-    Markers are the events; arrows lead from where stability is lost to where the belt snaps. `support` is named as for
-    `Equilibrium.reaction`; if None it is the one that the path moves, or the last. A belt without any has no force to
-    show.
+    Lines of stable states are solid, of unstable ones dashed, of undecided ones dotted. Markers are the events; arrows
+    lead from where stability is lost to where the belt snaps. `support` is named as for `Equilibrium.reaction`; if None
+    it is the one that the path moves, or the last. A belt without any has no force to show.
 
     Errors: `NoSupport`.
     """

@@ -71,6 +71,17 @@ pub enum NoPath {
     Invalid(String),
 }
 
+/// A value that is no number, by its kind where it is long.
+fn told(value: &Value) -> String {
+    const SHORT: usize = 40;
+    let text = value.to_string();
+    match value {
+        Value::Object(_) if text.len() > SHORT => "a table".to_owned(),
+        Value::Array(_) if text.len() > SHORT => "a list".to_owned(),
+        _ => text,
+    }
+}
+
 impl Path {
     /// Numbers of the scenario, each named as in `supports[1].position[2]`, that change together from their own values to
     /// others.
@@ -86,7 +97,7 @@ impl Path {
             let from = found.and_then(Value::as_f64);
             let from = from.ok_or_else(|| NoPath::NoNumber {
                 field: field.clone(),
-                found: found.map_or("nothing".to_owned(), ToString::to_string),
+                found: found.map_or("nothing".to_owned(), told),
                 example: "supports[1].position[1]".to_owned(),
             })?;
             Ok(Number {
