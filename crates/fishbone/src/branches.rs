@@ -5,16 +5,16 @@
 //! equilibrium, followed until it takes none, leads to another, of one index more or less; and from a saddle it is downhill
 //! to both sides.
 
+mod starts;
+
 use crate::equilibrium::{
-    Equilibrium, Status, is_settled, minimum_from, minimum_next_to, of_solution, program_of,
+    Equilibrium, Status, is_settled, minimum_from, minimum_next_to, of_solution,
 };
-use crate::guess::{guess, waved};
 use crate::program::{BeltPoint, BeltProgram};
 use crate::scenario::{Method, Scenario};
 use crate::solver::{self, Mode, Stationary};
 use crate::twins::{SAME, are_twins};
 use nalgebra::{Vector2, Vector3};
-use std::f64::consts::PI;
 use std::ops::ControlFlow;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -113,34 +113,48 @@ impl Census<'_> {
         slots.into_iter().filter_map(OnceLock::into_inner).collect()
     }
 
-    /// Enters an equilibrium unless it is known or of too many negative modes; whether it is new.
-    fn enter(&mut self, equilibrium: Equilibrium) -> bool {
-        let index = equilibrium.stability.map_or(0, |s| s.negative_modes);
-        if equilibrium.status != Status::Converged || index > HIGHEST_INDEX {
-            return false;
+    /// Enters an equilibrium unless it is known or of too many negative modes.
+    fn enter(&mut self, equilibrium: Equilibrium) {
+        if equilibrium.status != Status::Converged || index(&equilibrium) > HIGHEST_INDEX {
+            return;
         }
         let twin = self
             .found
             .iter_mut()
             .find(|known| is_twin(known, &equilibrium));
         match twin {
-            None => {
-                self.found.push(equilibrium);
-                true
-            }
+            None => self.found.push(equilibrium),
             Some(twin) => {
                 if height(&equilibrium) > height(twin) + 1e-9 * equilibrium.spine.length() {
                     *twin = equilibrium;
                 }
-                false
             }
         }
+    }
+
+    /// The lowest in energy of what `may` be chosen, and is like none that is `known`; these are known from then on.
+    fn lowest_unlike(
+        &self,
+        known: &mut Vec<Equilibrium>,
+        most: usize,
+        may: impl Fn(&Equilibrium) -> bool,
+    ) -> Vec<Equilibrium> {
+        let mut found: Vec<_> = self.found.iter().filter(|e| may(e)).collect();
+        found.sort_by(|a, b| a.energy.total_cmp(&b.energy));
+        let before = known.len();
+        for equilibrium in found {
+            let is_enough = known.len() == before + most;
+            if !is_enough && !known.iter().any(|known| is_like(known, equilibrium)) {
+                known.push(equilibrium.clone());
+            }
+        }
+        known[before..].to_vec()
     }
 
     /// Minimises from many starts.
     fn start(&mut self) {
         let scenario = self.scenario;
-        let starts = starts(scenario);
+        let starts = starts::starts(scenario);
         let watch = self.watch;
         let found = self.each(&starts, |start| {
             minimum_from(scenario, start, &mut || watch.proceed())
@@ -153,21 +167,16 @@ impl Census<'_> {
     /// Kicks the minima along their lowest modes, the lowest in energy first, and what is found so in turn; of those that
     /// are alike one.
     fn kick(&mut self) {
-        let mut kicked: Vec<Equilibrium> = Vec::new();
-        while kicked.len() < KICKED {
-            self.found.sort_by(|a, b| a.energy.total_cmp(&b.energy));
-            let before = kicked.len();
-            for minimum in self.found.iter().filter(|e| e.stable() == Some(true)) {
-                if kicked.len() < KICKED && !kicked.iter().any(|known| is_like(known, minimum)) {
-                    kicked.push(minimum.clone());
-                }
-            }
-            let next = &kicked[before..];
+        let mut kicked = Vec::new();
+        loop {
+            let is_minimum = |e: &Equilibrium| e.stable() == Some(true);
+            let most = KICKED - kicked.len();
+            let next = self.lowest_unlike(&mut kicked, most, is_minimum);
             if next.is_empty() {
                 return;
             }
             let (scenario, watch) = (self.scenario, self.watch);
-            let found = self.each(next, |minimum| {
+            let found = self.each(&next, |minimum| {
                 let modes = lowest_modes(minimum, KICKED_MODES);
                 let kick = |mode: &Mode| kicked_along(scenario, minimum, mode, watch);
                 modes.iter().flat_map(kick).collect::<Vec<_>>()
@@ -180,19 +189,18 @@ impl Census<'_> {
 
     /// Pushes what was found along its lowest modes, the lowest in energy first, and what is found so in turn.
     fn push(&mut self) {
-        let mut pushed: Vec<f64> = Vec::new();
-        while pushed.len() < PUSHED {
-            let is_new = |e: &&Equilibrium| !pushed.contains(&e.energy);
-            let mut next: Vec<_> = self.found.iter().filter(is_new).cloned().collect();
-            next.sort_by(|a, b| a.energy.total_cmp(&b.energy));
-            next.truncate(AT_A_TIME);
+        let mut pushed = Vec::new();
+        loop {
+            let most = AT_A_TIME.min(PUSHED - pushed.len());
+            let next = self.lowest_unlike(&mut pushed, most, |_| true);
             if next.is_empty() {
                 return;
             }
-            pushed.extend(next.iter().map(|equilibrium| equilibrium.energy));
             let modes = self.each(&next, |equilibrium| {
-                let index = equilibrium.stability.map_or(0, |s| s.negative_modes);
-                lowest_modes(equilibrium, PUSHED_MODES[index.min(HIGHEST_INDEX)])
+                lowest_modes(
+                    equilibrium,
+                    PUSHED_MODES[index(equilibrium).min(HIGHEST_INDEX)],
+                )
             });
             let tasks: Vec<_> = next
                 .iter()
@@ -211,9 +219,7 @@ impl Census<'_> {
             }
         }
     }
-}
 
-impl Census<'_> {
     /// Keeps what a mesh twice as fine has too; of those that the mesh does not tell apart the lowest.
     fn confirm(&mut self) {
         let mut found = std::mem::take(&mut self.found);
@@ -238,9 +244,7 @@ impl Census<'_> {
             }
         }
     }
-}
 
-impl Census<'_> {
     /// Takes the mirror image of a minimum for it, where that meets the supports too and bulges more as asked.
     fn face(&mut self) {
         let found = std::mem::take(&mut self.found);
@@ -360,6 +364,11 @@ fn downhill(
         .collect()
 }
 
+/// Number of negative modes, 0 where that is open.
+fn index(equilibrium: &Equilibrium) -> usize {
+    equilibrium.stability.map_or(0, |s| s.negative_modes)
+}
+
 /// Whether two are the same.
 fn is_twin(a: &Equilibrium, b: &Equilibrium) -> bool {
     const SAME_LEVEL: f64 = 1e-4;
@@ -389,94 +398,4 @@ const NEAR: f64 = 0.03;
 fn height(equilibrium: &Equilibrium) -> f64 {
     let bulge = Vector3::from(equilibrium.scenario.solver.bulge);
     equilibrium.highest_point().position.dot(&bulge.normalize())
-}
-
-/// Shapes from which to search: arches to both sides and the straight belt with waves of bend and of rib slope over them,
-/// then sums of waves that cover the space of such sums evenly.
-fn starts(scenario: &Scenario) -> Vec<BeltPoint> {
-    let program = program_of(scenario, scenario.elements());
-    let bulge = Vector3::from(scenario.solver.bulge);
-    let [up, down] = [bulge, -bulge].map(|bulge| guess(&program, &bulge));
-    let mut starts = Vec::new();
-    for (base, kept) in [(&up, 1.0), (&down, 1.0), (&up, 0.0)] {
-        for (bend_waves, bend) in BENDS {
-            for (slope_waves, slope) in SLOPES {
-                starts.push(waved(&program, base, kept, &|u| {
-                    Vector2::new(
-                        bend * (PI * bend_waves * u).cos(),
-                        slope * (PI * slope_waves * u).sin(),
-                    )
-                }));
-            }
-        }
-    }
-    starts.extend((0..SUMS).map(|i| {
-        let sum = Sum::new(i);
-        waved(&program, &up, 0.0, &|u| sum.at(u))
-    }));
-    starts
-}
-
-/// Waves of bend: half waves along the belt, and amplitude in 1/U.
-const BENDS: [(f64, f64); 9] = [
-    (0.0, 0.0),
-    (0.0, 4.0),
-    (0.0, -4.0),
-    (1.0, 4.0),
-    (1.0, -4.0),
-    (2.0, 8.0),
-    (2.0, -8.0),
-    (3.0, 12.0),
-    (3.0, -12.0),
-];
-/// Waves of rib slope: half waves along the belt, and amplitude.
-const SLOPES: [(f64, f64); 5] = [(1.0, 0.0), (1.0, 0.5), (1.0, -0.5), (2.0, 0.5), (2.0, -0.5)];
-/// Number of sums of waves.
-const SUMS: usize = 2000;
-/// Number of waves in each.
-const WAVES: usize = 5;
-
-/// Sums of waves of bend and rib slope.
-struct Sum {
-    /// Amplitude and phase of every wave of bend, then of slope.
-    waves: [[(f64, f64); WAVES]; 2],
-}
-
-impl Sum {
-    /// The i-th of a sequence that covers all evenly: bends up to one and a half times that of a ring and slopes up to 0.5, root mean square.
-    ///
-    /// Source: M. Roberts, "The unreasonable effectiveness of quasirandom sequences" (2018).
-    fn new(i: usize) -> Self {
-        const NUMBERS: usize = 2 + 4 * WAVES;
-        // The root of x^(d+1) = x + 1, d the number of dimensions.
-        let mut root: f64 = 1.0;
-        for _ in 0..50 {
-            root = (1.0 + root).powf(1.0 / (NUMBERS as f64 + 1.0));
-        }
-        let mut ratio = 1.0;
-        let mut next = || {
-            ratio /= root;
-            (0.5 + (i as f64 + 1.0) * ratio).fract()
-        };
-        let sizes = [3.0 * PI * next(), 0.5 * next()];
-        let waves = sizes.map(|size| {
-            let mut waves = [(0.0, 0.0); WAVES];
-            for wave in &mut waves {
-                *wave = (2.0 * next() - 1.0, 2.0 * PI * next());
-            }
-            let norm = waves.iter().map(|wave| wave.0 * wave.0).sum::<f64>().sqrt();
-            waves.map(|(amplitude, phase)| (size * 2f64.sqrt() * amplitude / norm, phase))
-        });
-        Self { waves }
-    }
-
-    fn at(&self, u: f64) -> Vector2<f64> {
-        let [bend, slope] = self.waves.map(|waves| {
-            let wave = |(k, (amplitude, phase)): (usize, &(f64, f64))| {
-                amplitude * (PI * k as f64 * u + phase).cos()
-            };
-            waves.iter().enumerate().map(wave).sum()
-        });
-        Vector2::new(bend, slope)
-    }
 }

@@ -2,7 +2,7 @@
 
 use super::apart::{keep_apart, unsettled};
 use super::assembly::Assembly;
-use super::search::{Search, is_flat_under_load};
+use super::search::{CLOSE, COLD, Search, is_flat_under_load};
 use super::{
     Equilibrium, LinkForce, Reaction, Solved, Start, Status, Units, Wrench, excess_distance,
     is_taut, number,
@@ -153,8 +153,8 @@ fn find(
     let mut program = assembly.program(scenario.elements());
     let solution = match from {
         Start::Near(shape) => search.from(&program, shape.clone(), proceed),
-        Start::Shape(shape) => search.only_from(&program, shape.clone(), proceed),
-        Start::Close(shape) => search.only_near(&program, shape.clone(), proceed),
+        Start::Shape(shape) => search.only_from(&program, shape.clone(), COLD, proceed),
+        Start::Close(shape) => search.only_from(&program, shape.clone(), CLOSE, proceed),
         Start::Guess => {
             let finer = scenario.elements() > scenario.default_elements();
             let coarse = finer.then(|| assembly.program(scenario.default_elements()));

@@ -10,11 +10,11 @@ use std::f64::consts::PI;
 use std::ops::ControlFlow;
 
 /// First barrier from a guess: so high that the search first finds the supports, then lowers the energy.
-const COLD: f64 = 10.0;
+pub(super) const COLD: f64 = 10.0;
 /// First barrier from the solution of a problem nearby.
 const WARM: f64 = 0.1;
 /// First barrier from the same minimum on another mesh.
-const CLOSE: f64 = 1e-3;
+pub(super) const CLOSE: f64 = 1e-3;
 const ITERATIONS: usize = 500;
 /// By how much the start is disturbed where the plain one leads to no minimum.
 const DISTURBANCES: [f64; 3] = [0.05, 0.2, 0.4];
@@ -96,24 +96,15 @@ impl Search {
         better(near, |_| self.cold(program, proceed))
     }
 
-    /// Searches from a shape of the same mesh that need not be near to a minimum, and from nowhere else.
+    /// Searches from a shape of the same mesh and from nowhere else, with a first barrier as it is near to a minimum or not.
     pub(super) fn only_from(
         &self,
         program: &BeltProgram,
         point: BeltPoint,
+        barrier: f64,
         proceed: &mut Proceed,
     ) -> Solution<BeltPoint> {
-        self.minimise(program, inside(program, point), COLD, proceed)
-    }
-
-    /// Searches from a shape of the same mesh next to a minimum, and from nowhere else.
-    pub(super) fn only_near(
-        &self,
-        program: &BeltProgram,
-        point: BeltPoint,
-        proceed: &mut Proceed,
-    ) -> Solution<BeltPoint> {
-        self.minimise(program, inside(program, point), CLOSE, proceed)
+        self.minimise(program, inside(program, point), barrier, proceed)
     }
 
     /// Searches from the guess, then from other starts, until a minimum is found; the best that was found otherwise.
