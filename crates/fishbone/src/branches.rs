@@ -20,7 +20,7 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Most minima that are kicked.
-const KICKED: usize = 128;
+const KICKED: usize = 96;
 /// Modes along which a minimum is kicked.
 const KICKED_MODES: usize = 4;
 /// Most equilibria that are pushed.

@@ -48,7 +48,7 @@ const BENDS: [(f64, f64); 9] = [
 /// Waves of rib slope: half waves along the belt, and amplitude.
 const SLOPES: [(f64, f64); 5] = [(1.0, 0.0), (1.0, 0.5), (1.0, -0.5), (2.0, 0.5), (2.0, -0.5)];
 /// Number of sums of waves.
-const SUMS: usize = 2000;
+const SUMS: usize = 4000;
 /// Number of waves in each.
 const WAVES: usize = 5;
 
