@@ -417,8 +417,8 @@ class Equilibrium:
         named as for `reaction`, and must hold a position and a rotation.
 
         Shapes: direction (6,).
-        Errors: `NoSupport`; `NoMargin` unless the equilibrium is stable; `InvalidArgument` for what is no direction or
-        reach.
+        Errors: `NoSupport`; `NoMargin` unless the equilibrium is stable, and where it can be followed only a part of
+        `reach` without losing its stability; `InvalidArgument` for what is no direction or reach.
         """
         if not 0.0 < reach <= MAX_REACH:
             raise InvalidArgument(f"reach: found {reach}, allowed above 0 and up to {MAX_REACH}")

@@ -367,7 +367,7 @@ fn belt_between(u: [f64; 2], belt: &BeltSpec) -> f64 {
 }
 
 /// Says by how much two points are held too far apart for the belt between them, where they are.
-fn excess_distance(scenario: &Scenario) -> Option<String> {
+pub(crate) fn excess_distance(scenario: &Scenario) -> Option<String> {
     let too_long = Span::all(scenario).find(|span| span.excess() > span.rounding)?;
     Some(format!(
         "{} are {} apart, {} more than the belt between them ({}); move them closer",

@@ -1,10 +1,10 @@
 //! How far a support may move before the belt loses its stability.
 
-use crate::equilibrium::{Equilibrium, Status};
+use crate::equilibrium::{Equilibrium, Status, excess_distance};
 use crate::follow::{Along, NoBranch};
 use crate::lie::{Pose, exp, log};
 use crate::path::{Motion, Path};
-use crate::solver::{Continuation, Events, Pace, Turn};
+use crate::solver::{Continuation, End, Events, Pace, Turn};
 use nalgebra::{Vector3, Vector6};
 use std::ops::ControlFlow;
 use thiserror::Error;
@@ -25,7 +25,7 @@ pub struct Margin {
 }
 
 /// Why there is no margin.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum NoMargin {
     /// The equilibrium cannot be followed.
@@ -39,6 +39,11 @@ pub enum NoMargin {
         "supports[{0}] does not hold a position and a rotation, all of both: nothing can be moved there"
     )]
     NotClamped(usize),
+    /// The equilibrium could be followed only so far, stable on the way.
+    #[error(
+        "the equilibrium could be followed only {0:.3} of the way to `reach`, stable until there: a shorter reach may do"
+    )]
+    Lost(f64),
 }
 
 /// The boundary of stability, as it is met along a direction.
@@ -46,6 +51,13 @@ struct Boundary {
     margin: Margin,
     /// Square to it, where it is a fold: the change of the support's reaction along the mode that vanishes.
     normal: Option<Vector6<f64>>,
+}
+
+/// Whether the supports are out of the belt's reach a little beyond a place.
+fn is_taut_beyond(path: &Path, place: f64) -> bool {
+    const A_LITTLE: f64 = 0.02;
+    let beyond = path.at(place + A_LITTLE);
+    beyond.is_none_or(|scenario| excess_distance(&scenario).is_some())
 }
 
 impl Equilibrium {
@@ -57,7 +69,7 @@ impl Equilibrium {
     ///
     /// # Errors
     ///
-    /// [`NoMargin`] unless the equilibrium is stable and the support holds all of a pose.
+    /// [`NoMargin`] unless the equilibrium is stable and the support holds all of a pose, and where it cannot be followed.
     pub fn margin_along(
         &self,
         support: usize,
@@ -84,14 +96,21 @@ impl Equilibrium {
         const ROUNDS: usize = 8;
         const SAME: f64 = 1e-6;
         let mut nearest: Option<Boundary> = None;
+        let mut lost = None;
         for axis in 0..6 {
             for sign in [1.0, -1.0] {
                 // Farther than what is known already there is nothing to find.
                 let reach = nearest.as_ref().map_or(reach, |b| b.margin.distance);
                 let direction = sign * Vector6::ith(axis, 1.0);
-                let found = self.boundary(support, &direction, reach, proceed)?;
-                nearest = found.or(nearest);
+                match self.boundary(support, &direction, reach, proceed) {
+                    Ok(found) => nearest = found.or(nearest),
+                    Err(NoMargin::Lost(share)) => lost = Some(share),
+                    Err(other) => return Err(other),
+                }
             }
+        }
+        if let (None, Some(share)) = (&nearest, lost) {
+            return Err(NoMargin::Lost(share));
         }
         for _ in 0..ROUNDS {
             let Some(best) = &nearest else {
@@ -104,9 +123,10 @@ impl Equilibrium {
             if 1.0 - towards.dot(&best.margin.direction) < SAME {
                 break;
             }
-            match self.boundary(support, &towards, best.margin.distance, proceed)? {
-                Some(nearer) => nearest = Some(nearer),
-                None => break,
+            match self.boundary(support, &towards, best.margin.distance, proceed) {
+                Ok(Some(nearer)) => nearest = Some(nearer),
+                Ok(None) | Err(NoMargin::Lost(_)) => break,
+                Err(other) => return Err(other),
             }
         }
         Ok(nearest.map(|boundary| boundary.margin))
@@ -157,12 +177,21 @@ impl Equilibrium {
         let start = continuation.start(&solved.at, 0.0, true);
         let start = start.ok_or(NoBranch::Singular)?;
         let curve = continuation.trace(start, &mut |_| proceed());
+        let reached = curve
+            .stations
+            .last()
+            .map_or(0.0, |station| station.parameter);
         let Some((_, event)) = curve
             .events
             .first()
             .filter(|(_, event)| event.negative[0] == 0)
         else {
-            return Ok(None);
+            return match curve.end {
+                End::Lost | End::Budget if !is_taut_beyond(&path, reached) => {
+                    Err(NoMargin::Lost(reached))
+                }
+                _ => Ok(None),
+            };
         };
         let pose = moved(event.parameter * reach);
         let rows = continuation.multipliers_along(event);
