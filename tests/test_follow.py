@@ -205,6 +205,22 @@ def test_every_state_is_an_equilibrium(turned, sheared):
             assert max(equilibrium.residuals) <= 1e-8
 
 
+@pytest.mark.parametrize("energy", ["fishbone", "wunderlich"])
+def test_a_band_is_followed_past_all_places_where_ribs_turn_over(energy):
+    """Sheared by 0.4 it meets plenty, both ways along its parameter."""
+    tables = arch(0.75).to_dict()
+    tables["energy"], tables["belt"]["width"] = energy, 1.0 / 6.0
+    diagram = fb.follow(fb.Scenario.from_dict(tables), {"supports[1].position[2]": 0.4}, branches=1)
+    [branch] = diagram.branches
+    assert branch.end == "range"
+    assert branch.parameter[-1] == 0.4
+    assert branch.events
+    for state in range(0, len(branch), 50):
+        equilibrium = branch.equilibrium(state)
+        assert equilibrium.status == "converged"
+        assert max(equilibrium.residuals) <= 1e-8
+
+
 def test_reports_are_those_of_the_equilibria(sheared):
     [branch] = sheared.branches
     for state in (0, len(branch) // 2, -1):
