@@ -120,6 +120,29 @@ def test_of_mirror_twins_the_one_is_given_that_bulges_as_asked(arches, mirrored_
             assert x.max() >= -x.min() - SAME
 
 
+def test_what_is_found_under_weight_does_not_depend_on_the_origin():
+    """Wherever the potential of the weight is zero."""
+
+    def found(x: float) -> list[fb.Equilibrium]:
+        belt = {"width": 0.3, "rigidity": 1.0, "density": 10.0, "segments": [{"kind": "straight", "length": 1.0}]}
+        ends = (("start", 0.0), ("end", 0.6))
+        clamps = [{"at": at, "position": [x, y, 0.0], "rotation": [0.0, 0.0, 0.0]} for at, y in ends]
+        loads = {"gravity": [-1.0, 0.0, 0.0]}
+        tables = {"belt": belt, "supports": clamps, "loads": loads, "solver": {"elements": 14}}
+        return fb.branches(fb.Scenario.from_dict(tables))
+
+    here, there = found(0.0), found(-1.9404)
+    assert [one.negative_modes for one in there] == [one.negative_modes for one in here]
+    bending = [one.elastic_energy for one in here]
+    np.testing.assert_allclose([one.elastic_energy for one in there], bending, rtol=1e-6)
+
+
+def test_a_belt_that_nothing_holds_is_flat_and_that_once():
+    belt = {"width": 0.1, "rigidity": 1.0, "segments": [{"kind": "straight", "length": 1.0}]}
+    [flat] = fb.branches(fb.Scenario.from_dict({"belt": belt}))
+    assert flat.energy < 1e-12
+
+
 # ---------------------------------------------------------------------------------------- how it is asked and told
 
 

@@ -350,17 +350,18 @@ def test_all_has_a_row_for_each_equilibrium(run, planar_file, told, arches):
     assert all(len(line) <= 80 for line in out.splitlines())
     assert f"{len(arches)} equilibria" in out
     rows = [line.split() for line in out.splitlines()[-len(arches) - 1 :] if line.strip()]
-    assert [row[0] for row in rows] == [report.number(one.energy) for one in arches]
-    assert [row[1] for row in rows] == ["yes" if one.stable else "no" for one in arches]
-    assert [int(row[2]) for row in rows] == [one.negative_modes for one in arches]
+    assert [int(row[0]) for row in rows] == list(range(len(arches)))
+    assert [row[1] for row in rows] == [report.number(one.energy) for one in arches]
+    assert [row[2] for row in rows] == ["yes" if one.stable else "no" for one in arches]
+    assert [int(row[3]) for row in rows] == [one.negative_modes for one in arches]
     for column, values in (
-        (3, [one.highest_point.position[0] for one in arches]),
-        (4, [one.least_spine_radius.value for one in arches]),
-        (5, [max(np.linalg.norm(one.reaction(index).force) for index in (0, 1)) for one in arches]),
-        (6, [one.twist for one in arches]),
+        (4, [one.highest_point.position[0] for one in arches]),
+        (5, [one.least_spine_radius.value for one in arches]),
+        (6, [max(np.linalg.norm(one.reaction(index).force) for index in (0, 1)) for one in arches]),
+        (7, [one.twist for one in arches]),
     ):
         assert [float(row[column]) for row in rows] == pytest.approx(values, abs=1e-4 * np.abs(values).max())
-    assert [row[7] for row in rows] == ["no" if one.crosses_itself is None else "yes" for one in arches]
+    assert [row[8] for row in rows] == ["no" if one.crosses_itself is None else "yes" for one in arches]
 
 
 def test_all_is_drawn_on_one_page(run, planar_file, told, arches):

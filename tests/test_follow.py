@@ -221,6 +221,29 @@ def test_a_band_is_followed_past_all_places_where_ribs_turn_over(energy):
         assert max(equilibrium.residuals) <= 1e-8
 
 
+@pytest.mark.parametrize("name", ["bent", "hinge", "curved"])
+@pytest.mark.parametrize("field", ["supports[1].position[2]", "belt.segments[0].length"])
+def test_boards_with_bends_are_followed_from_where_they_were_solved(name, field):
+    """With the edges that hold their ribs, and as many elements to every stretch; states are equilibria to the last."""
+    start = fb.solve(fb.load(ROOT / "scenarios" / f"{name}.toml"), strict=True)
+    tables = start.scenario.to_dict()
+    length = tables["belt"]["segments"][0]["length"]
+    last = {"supports[1].position[2]": tables["supports"][1]["position"][2] + 0.1 * length, field: 1.1 * length}
+    [branch] = fb.follow(start, {field: last[field]}, branches=1, states=60).branches
+    first = branch.equilibrium(0)
+    assert first.energy == pytest.approx(start.energy, rel=1e-6)
+    assert len(branch) > 10
+    for state in (0, len(branch) // 2, -1):
+        assert branch.equilibrium(state).status == "converged"
+
+
+def test_a_belt_that_is_drawn_straight_ends_there_and_branches_off_nowhere():
+    [branch] = fb.follow(arch(), {"supports[1].position[1]": 1.3}).branches
+    assert branch.end == "taut"
+    assert branch.events == []
+    assert branch.parameter.max() < 1.0 + 1e-6
+
+
 def test_reports_are_those_of_the_equilibria(sheared):
     [branch] = sheared.branches
     for state in (0, len(branch) // 2, -1):

@@ -198,3 +198,26 @@ def test_margin_is_refused_where_there_is_none() -> None:
         equilibrium.snap_margin(reach=0.0)
     with pytest.raises(fb.NoMargin, match="not stable"):
         flat(strut(-90.0)).snap_margin()
+
+
+@pytest.mark.parametrize("reach", [1.5, 3.5, 5.0])
+def test_margin_does_not_depend_on_how_far_it_looks(reach):
+    """Beyond half a turn the way is not the shorter one."""
+    margin = solve(clamped((0.0, 0.6, 0.0))).snap_margin(direction=(0.0, 0.0, 0.0, 0.0, 0.0, -1.0), reach=reach)
+    assert margin.distance == pytest.approx(1.1230897421, abs=1e-4)
+
+
+def test_belt_that_is_drawn_taut_has_lost_nothing():
+    assert solve(clamped((0.0, 0.6, 0.0))).snap_margin(direction=(0.0, 1.0, 0.0, 0.0, 0.0, 0.0), reach=0.6) is None
+
+
+def test_nearest_margin_is_below_that_along_many_directions():
+    """Of the planar arch, where branching off lies along z, and of a belt that leans."""
+    rng = np.random.default_rng(0)
+    for equilibrium in (solve(clamped((0.0, 0.6, 0.0))), solve(clamped((0.0, 0.5, 1.0 / 6.0), (0.0, 1.2, 0.0)))):
+        nearest = equilibrium.snap_margin()
+        again = equilibrium.snap_margin(direction=nearest.direction)
+        assert again.distance == pytest.approx(nearest.distance, rel=1e-6)
+        for direction in rng.normal(size=(10, 6)):
+            found = equilibrium.snap_margin(direction=direction, reach=nearest.distance)
+            assert found is None or found.distance > 0.95 * nearest.distance

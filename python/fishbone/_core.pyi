@@ -24,7 +24,7 @@ __version__: Final[str]
 _Row = list[float]
 _Status = Literal["converged", "infeasible", "not_converged"]
 _Kind = Literal["fold", "pitchfork", "transcritical", "bifurcation"]
-_End = Literal["range", "event", "closed", "budget", "lost"]
+_End = Literal["range", "event", "closed", "budget", "lost", "edges", "taut"]
 _Floats = NDArray[np.float64]
 
 @final

@@ -19,6 +19,8 @@ from fishbone.files import check_writable, write_whole
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
+    from rich.console import Console
+
     from fishbone.equilibrium import Equilibrium
     from fishbone.follow import Columns, Diagram
     from fishbone.tracker import Place
@@ -61,6 +63,7 @@ def _output(*suffixes: str) -> Callable[[click.Context, click.Parameter, Path | 
 
 
 _PATH = click.Path(path_type=Path)
+_WIDE = 160
 
 
 class Commands(click.Group):
@@ -196,11 +199,17 @@ def _reason(equilibrium: Equilibrium) -> str:
 
 
 def _print(equilibria: list[Equilibrium], *, is_all: bool) -> None:
-    from rich.console import Console  # noqa: PLC0415
-
     from fishbone.report import report, report_all  # noqa: PLC0415
 
-    Console(highlight=False).print(report_all(equilibria) if is_all else report(equilibria[0]))
+    _console().print(report_all(equilibria) if is_all else report(equilibria[0]))
+
+
+def _console() -> Console:
+    """What tables are printed to: as wide as they need where that is no terminal."""
+    from rich.console import Console  # noqa: PLC0415
+
+    console = Console(highlight=False)
+    return console if console.is_terminal else Console(highlight=False, width=_WIDE)
 
 
 def _warn(file: Path, equilibria: list[Equilibrium]) -> None:
@@ -273,6 +282,12 @@ def follow(  # noqa: PLR0913 - one for each option
             diagram = fishbone.follow(scenario, path, step=step, states=states, branches=branches, progress=progress)
     except NoBranch as error:
         raise NoEquilibrium(f"{file}: {' '.join(str(error).split())}") from error
+    with _progress(lambda branch, count: ("reporting", branch, max(count, 1))) as progress:
+        for index, branch in enumerate(diagram.branches):
+            if progress is not None:
+                progress(index, len(diagram.branches))
+            # Computed here and kept.
+            _ = branch.energy
     # All is made before anything is written, so that a failure leaves nothing behind.
     contents = {}
     text = encode(diagram.to_dict()) if as_json or out is not None else ""
@@ -375,11 +390,9 @@ def encode_table(columns: Columns) -> bytes:
 
 
 def _print_diagram(diagram: Diagram) -> None:
-    from rich.console import Console  # noqa: PLC0415
-
     from fishbone.report import report_diagram  # noqa: PLC0415
 
-    Console(highlight=False).print(report_diagram(diagram))
+    _console().print(report_diagram(diagram))
 
 
 @command.command()

@@ -420,8 +420,8 @@ class Equilibrium:
         Errors: `NoSupport`; `NoMargin` unless the equilibrium is stable, and where it can be followed only a part of
         `reach` without losing its stability; `InvalidArgument` for what is no direction or reach.
         """
-        if not 0.0 < reach <= MAX_REACH:
-            raise InvalidArgument(f"reach: found {reach}, allowed above 0 and up to {MAX_REACH}")
+        if not (np.ndim(reach) == 0 and 0.0 < reach <= MAX_REACH):
+            raise InvalidArgument(f"reach: found {reach!r}, allowed above 0 and up to {MAX_REACH:g}, in U and rad")
         along = None if direction is None else _direction(direction)
         try:
             margin = self._inner.margin(self._support_index(support), along, reach)

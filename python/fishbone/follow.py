@@ -33,7 +33,7 @@ MIN_STATES, MAX_STATES = 2, 100_000
 MAX_BRANCHES = 1000
 
 Kind = Literal["fold", "pitchfork", "transcritical", "bifurcation"]
-End = Literal["range", "event", "closed", "budget", "lost"]
+End = Literal["range", "event", "closed", "budget", "lost", "edges", "taut"]
 
 
 class Poses(NamedTuple):
@@ -112,7 +112,9 @@ class Branch:
         """The event of another branch where it begins; None of the first, which begins with the path."""
         self.end: End = inner.end(index)
         """Why it ends: with the path ("range"), in another that it meets head on ("event"), where it began ("closed"),
-        with `states` of `follow` ("budget"), or because no step, however short, leads on ("lost")."""
+        where it is drawn straight ("taut"), where ribs reach edges beside a bend that held none before or leave those
+        that did ("edges"), with `states` of `follow` ("budget"), or because no step, however short, leads on
+        ("lost")."""
         self.events: list[Event] = [_event(*event) for event in inner.events(index)]
         """Its events in order."""
 

@@ -309,12 +309,13 @@ def _draw_overview(equilibria: Sequence[Equilibrium], viewer: ArrayLike) -> Figu
     first = equilibria[0]
     name = first.scenario.to_dict().get("name") or "belt"
     more = len(equilibria) - len(shown)
-    rest = f"; {more} more are not shown" if more else ""
+    rest = f"; {more} more not shown" if more else ""
     figure.suptitle(f"{name}: {first.energy_model} energy{rest}", fontsize=10.0, parse_math=False)
     panels = figure.subplots(rows, columns, squeeze=False).ravel().tolist()
-    for axes, equilibrium in zip(panels, shown, strict=False):
+    for index, (axes, equilibrium) in enumerate(zip(panels, shown, strict=False)):
         draw_oblique(axes, equilibrium, viewer)
-        axes.set_title(f"{equilibrium.energy:.5g}, {stability(equilibrium)}")
+        crossing = "" if equilibrium.crosses_itself is None else "\npasses through itself"
+        axes.set_title(f"{index}: {equilibrium.energy:.5g}, {stability(equilibrium)}{crossing}")
     for axes in panels[len(shown) :]:
         axes.set_axis_off()
     height = side * _set_one_scale(panels[: len(shown)])

@@ -25,6 +25,8 @@ ENDS = {
     "closed": "ends where it began",
     "budget": "has used up its states before the end of the path",
     "lost": "ends where no step, however short, leads on",
+    "taut": "ends where the belt is drawn straight",
+    "edges": "ends where ribs beside a bend come to other edges of the board",
 }
 """What becomes of a branch that does not end with the path."""
 NOUGHT = 1e-9
@@ -58,6 +60,7 @@ def report_diagram(diagram: Diagram) -> Group:
         for index, branch in enumerate(diagram.branches)
         if branch.end in ENDS
     ]
+    ends += [Text(f"branch {index} turns back: {back}") for index, back in _turned_back(diagram)]
     has_events = any(branch.events for branch in diagram.branches)
     return Group(title, _branches(diagram), *ends, _events(diagram) if has_events else Text("no events"))
 
@@ -199,14 +202,16 @@ def _place(at: float | str, u: Floats) -> str:
 
 
 def _equilibria(equilibria: Sequence[Equilibrium]) -> Table:
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    table.add_column("energy", justify="right")
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
+    table.add_column("", justify="right")
+    table.add_column("energy", justify="right", no_wrap=True)
     table.add_column("local\nminimum")
     for heading in ("negative\nmodes", "height", "bend\nradius\non spine", "largest\nforce", "twist"):
-        table.add_column(heading, justify="right")
+        table.add_column(heading, justify="right", no_wrap=True)
     table.add_column("crosses\nitself")
     radii = [equilibrium.least_spine_radius for equilibrium in equilibria]
     columns = [
+        [str(index) for index in range(len(equilibria))],
         [number(equilibrium.energy) for equilibrium in equilibria],
         [MINIMUM[equilibrium.stable] for equilibrium in equilibria],
         ["" if one.negative_modes is None else str(one.negative_modes) for one in equilibria],
@@ -255,6 +260,15 @@ def _branches(diagram: Diagram) -> Table:
             str(index), _beginning(diagram, branch), stable, *map(_from_to, (branch.parameter, branch.energy))
         )
     return table
+
+
+def _turned_back(diagram: Diagram) -> Iterator[tuple[int, str]]:
+    """The branches that begin with the path and end there too, and how far they come."""
+    for index, branch in enumerate(diagram.branches):
+        parameter = branch.parameter
+        if branch.origin is None and branch.end == "range" and parameter[-1] == parameter[0]:
+            farthest = parameter[np.argmax(np.abs(parameter - parameter[0]))]
+            yield index, f"it gets as far as {number(farthest)} and ends where the path begins"
 
 
 def _beginning(diagram: Diagram, branch: Branch) -> str:

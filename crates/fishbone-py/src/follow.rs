@@ -145,6 +145,8 @@ impl Diagram {
             End::Closed => "closed",
             End::Budget => "budget",
             End::Lost => "lost",
+            End::Edges => "edges",
+            End::Taut => "taut",
             End::Interrupted => "interrupted",
         }
     }
@@ -180,12 +182,17 @@ impl Diagram {
     /// What is to be reported of all states of a branch.
     ///
     /// Shapes: (m,) each, forces and moments (m, supports, 3); NaN where nothing bends.
+    /// Errors: whatever a signal handler raises.
     fn report<'py>(&self, py: Python<'py>, branch: usize) -> PyResult<Report<'py>> {
         let states = 0..self.0.branches[branch].states.len();
+        let mut signals = Signals::new();
         let summaries: Vec<Summary> = py.detach(|| {
-            let summary = |state| self.0.summary(branch, state);
-            states.map(summary).collect()
+            let going = states.take_while(|_| signals.proceed().is_continue());
+            going.map(|state| self.0.summary(branch, state)).collect()
         });
+        if let Some(error) = signals.raised {
+            return Err(error);
+        }
         let column = |of: fn(&Summary) -> f64| -> Scalars<'py> {
             summaries
                 .iter()

@@ -233,19 +233,36 @@ impl Belt {
     /// `count` elements shared out by length, a few more where that takes parts of one between two breaks, ends of
     /// segments or entries of a table of rigidity; lengths in U, rigidity in its mean. A stiffened stretch is one piece.
     pub fn pieces(&self, count: usize, breaks: &[Break]) -> Vec<Piece> {
+        let shared = self.pieces_shared(&self.shares(count, breaks), breaks);
+        shared.expect("a share for every stretch")
+    }
+
+    /// How many elements every stretch gets of a count.
+    pub fn shares(&self, count: usize, breaks: &[Break]) -> Vec<usize> {
+        let of_length = |stretch: &Stretch| (stretch.to - stretch.from) / self.length();
+        let stretches = self.stretches(breaks);
+        let share = |stretch: &Stretch| share(count, of_length(stretch)).max(stretch.fewest());
+        stretches.iter().map(share).collect()
+    }
+
+    /// The same with so many elements to every stretch; `None` where there are not as many stretches.
+    pub fn pieces_shared(&self, shares: &[usize], breaks: &[Break]) -> Option<Vec<Piece>> {
         let length = self.length();
+        let stretches = self.stretches(breaks);
+        if stretches.len() != shares.len() {
+            return None;
+        }
         let mut pieces = Vec::new();
-        for stretch in &self.stretches(breaks) {
-            let share = share(count, (stretch.to - stretch.from) / length).max(stretch.fewest());
+        for (stretch, share) in stretches.iter().zip(shares) {
             pieces.extend(stretch.joint);
             match stretch.segment {
-                Segment::Strip(strip) => pieces.extend(self.elements(strip, stretch, share)),
+                Segment::Strip(strip) => pieces.extend(self.elements(strip, stretch, *share)),
                 Segment::Rigid { .. } | Segment::Corner { .. } => pieces.push(Piece::Rigid {
                     length: (stretch.to - stretch.from) / length,
                 }),
             }
         }
-        pieces
+        Some(pieces)
     }
 
     fn stretches(&self, breaks: &[Break]) -> Vec<Stretch<'_>> {

@@ -291,7 +291,7 @@ fn on_finer_mesh(
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Option<Equilibrium> {
     let fine = found.refined(2 * found.scenario.elements(), proceed)?;
-    let is_level = (fine.energy - found.energy).abs() <= LEVEL * found.energy.abs();
+    let is_level = (fine.energy - found.energy).abs() <= LEVEL * size(found);
     (is_level && found.displacement(&fine) <= NEAR).then_some(fine)
 }
 
@@ -369,6 +369,17 @@ fn index(equilibrium: &Equilibrium) -> usize {
     equilibrium.stability.map_or(0, |s| s.negative_modes)
 }
 
+/// What differences of energy are measured by: that of bending, as the zero of a load's potential is anywhere; of a flat belt
+/// next to nothing.
+fn size(equilibrium: &Equilibrium) -> f64 {
+    const FLAT: f64 = 1e-6;
+    let unit = equilibrium
+        .solved
+        .as_ref()
+        .map_or(0.0, |solved| solved.units.energy);
+    equilibrium.elastic_energy.max(FLAT * unit)
+}
+
 /// Whether two are the same.
 fn is_twin(a: &Equilibrium, b: &Equilibrium) -> bool {
     const SAME_LEVEL: f64 = 1e-4;
@@ -383,7 +394,7 @@ fn is_like(a: &Equilibrium, b: &Equilibrium) -> bool {
 /// Whether two differ by no more than a share of the energy and a distance in U, and in no number of negative modes.
 fn is_within(a: &Equilibrium, b: &Equilibrium, share: f64, distance: f64) -> bool {
     let solved = || Some((a.solved.as_ref()?, b.solved.as_ref()?));
-    let is_level = (a.energy - b.energy).abs() <= share * a.energy.abs().max(b.energy.abs());
+    let is_level = (a.energy - b.energy).abs() <= share * size(a).max(size(b));
     let index = |e: &Equilibrium| e.stability.map(|s| s.negative_modes);
     is_level
         && index(a) == index(b)

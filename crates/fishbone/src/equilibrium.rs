@@ -9,11 +9,12 @@ mod search;
 use crate::belt::Belt;
 use crate::guess::{guess, waved};
 use crate::lie::Pose;
-use crate::program::{BeltPoint, BeltProgram};
+use crate::program::{BeltPoint, BeltProgram, Piece};
 use crate::scenario::{BeltSpec, LinkSpec, Method, SAME_PLACE, Scenario, SupportSpec};
 use crate::solver::{self, Inertia, Residuals, Solution, Stationary};
 use crate::spine::Spine;
 use crate::stability::Stability;
+use crate::strip::{Edge, FURTHER};
 use nalgebra::{Vector2, Vector3};
 use serde::Serialize;
 use std::ops::ControlFlow;
@@ -284,6 +285,46 @@ pub(crate) fn of_solution(
 pub(crate) fn program_of(scenario: &Scenario, elements: usize) -> BeltProgram {
     let belt = Belt::new(&scenario.belt).expect("a validated scenario");
     assembly::Assembly::new(scenario, &belt).program(elements)
+}
+
+/// The mesh of an equilibrium, and the edges that hold its ribs: what stays the same while it is followed.
+#[derive(Debug, Clone)]
+pub(crate) struct Mesh {
+    shares: Vec<usize>,
+    further: Vec<Option<[Option<Edge>; FURTHER]>>,
+}
+
+impl Mesh {
+    /// That of a programme of a scenario.
+    pub(crate) fn of(scenario: &Scenario, program: &BeltProgram) -> Self {
+        let belt = Belt::new(&scenario.belt).expect("a validated scenario");
+        let further = |piece: &Piece| match piece {
+            Piece::Strip(element) => Some(element.further),
+            Piece::Rigid { .. } | Piece::Joint { .. } => None,
+        };
+        Self {
+            shares: assembly::Assembly::new(scenario, &belt).shares(scenario.elements()),
+            further: program.pieces.iter().map(further).collect(),
+        }
+    }
+
+    /// The programme of a scenario on it; `None` where its stretches are others.
+    pub(crate) fn program(&self, scenario: &Scenario) -> Option<BeltProgram> {
+        let belt = Belt::new(&scenario.belt).expect("a validated scenario");
+        let assembly = assembly::Assembly::new(scenario, &belt);
+        let mut program = assembly.program_shared(&self.shares)?;
+        if program.pieces.len() != self.further.len() {
+            return None;
+        }
+        for (piece, held) in program.pieces.iter_mut().zip(&self.further) {
+            match (piece, held) {
+                (Piece::Strip(element), Some(held)) => element.further = *held,
+                (Piece::Rigid { .. } | Piece::Joint { .. }, None) => (),
+                _ => return None,
+            }
+        }
+        Some(program)
+    }
 }
 
 /// Whether the ribs of a shape are apart on the whole board.

@@ -1,6 +1,8 @@
 //! The equilibria along a path, stable or not: where they fold, where others branch off, and what the belt snaps to.
 
-use crate::equilibrium::{Equilibrium, Status, Wrench, of_solution, program_of};
+use crate::equilibrium::{
+    Equilibrium, Mesh, Status, Wrench, excess_distance, is_settled, of_solution,
+};
 use crate::path::Path;
 use crate::program::{BeltPoint, BeltProgram};
 use crate::scenario::Scenario;
@@ -27,7 +29,9 @@ pub enum NoBranch {
     #[error("there is nothing to follow: {0}")]
     NotConverged(String),
     /// The equilibrium has no single continuation.
-    #[error("the equilibrium may move at no cost of energy: there is no one branch to follow")]
+    #[error(
+        "no single branch could be found to follow: the equilibrium may move at no cost of energy, or the solver cannot go on"
+    )]
     Singular,
 }
 
@@ -60,7 +64,7 @@ pub struct Diagram {
     pub path: Path,
     /// The branches: first that of the equilibrium where the path begins, then those that branch off.
     pub branches: Vec<Branch>,
-    elements: usize,
+    mesh: Mesh,
     settings: Settings,
 }
 
@@ -173,17 +177,23 @@ pub struct Snapped {
 /// The programmes of the scenarios along a path, all on the same mesh.
 pub(crate) struct Along<'a> {
     pub(crate) path: &'a Path,
-    pub(crate) elements: usize,
-    pub(crate) nodes: usize,
+    pub(crate) mesh: &'a Mesh,
 }
 
 impl Family for Along<'_> {
     type Program = BeltProgram;
 
     fn at(&self, place: f64) -> Option<BeltProgram> {
-        let program = program_of(&self.path.at(place)?, self.elements);
-        (program.pieces.len() + 1 == self.nodes).then_some(program)
+        self.mesh.program(&self.path.at(place)?)
     }
+}
+
+/// Whether the supports are out of the belt's reach next to a place.
+pub(crate) fn is_taut_beyond(path: &Path, place: f64) -> bool {
+    const A_LITTLE: f64 = 0.02;
+    let beside = [place - A_LITTLE, place + A_LITTLE].map(|place| path.at(place));
+    let mut known = beside.iter().flatten();
+    known.any(|scenario| excess_distance(scenario).is_some())
 }
 
 /// Follows an equilibrium of the path's first scenario along the path.
@@ -204,11 +214,8 @@ pub fn follow(
     if equilibrium.status != Status::Converged {
         return Err(NoBranch::NotConverged(equilibrium.message.clone()));
     }
-    let family = Along {
-        path,
-        elements: path.base().elements(),
-        nodes: solved.at.point.poses.len(),
-    };
+    let mesh = Mesh::of(path.base(), &solved.program);
+    let family = Along { path, mesh: &mesh };
     let pace = Pace {
         longest: settings.step,
         stations: settings.states,
@@ -224,12 +231,15 @@ pub fn follow(
         diagram: Diagram {
             path: path.clone(),
             branches: Vec::new(),
-            elements: family.elements,
+            mesh: mesh.clone(),
             settings: *settings,
         },
     };
     search.trace(None, start);
-    Ok(search.diagram)
+    match search.diagram.branches.is_empty() {
+        true => Err(NoBranch::Singular),
+        false => Ok(search.diagram),
+    }
 }
 
 /// A diagram in the making.
@@ -250,25 +260,26 @@ impl Search<'_, '_> {
             stations,
             events,
             end,
-        } = curve;
+        } = self.settled(curve);
+        if stations.is_empty() {
+            return;
+        }
         self.diagram.branches.push(Branch {
             origin,
             states: stations.iter().map(State::of).collect(),
             events: Vec::new(),
             end,
         });
-        /// As near to where a branch is its own mirror image a push off it begins.
-        const BEFORE: f64 = 5e-3;
         for (state, event) in events {
             if end == End::Interrupted {
                 return;
             }
-            let crossing = self.crossing(&event, before_by(BEFORE, &event, &stations[..state]));
+            let crossing = self.crossing(&event, &stations[..state]);
             let onwards = (event.parameter - stations[state - 1].parameter).signum();
-            let snapped = match event.negative {
-                [0, _] => self.snapped(&event, &crossing, onwards),
-                _ => None,
-            };
+            let is_loss = event.negative[0] == 0 && event.negative[1] > 0;
+            let snapped = is_loss
+                .then(|| self.snapped(&event, &crossing, onwards))
+                .flatten();
             let events = &mut self.diagram.branches[index].events;
             let origin = Origin {
                 branch: index,
@@ -296,14 +307,41 @@ impl Search<'_, '_> {
         }
     }
 
+    /// A curve as far as the ribs are held by the edges that they reach, and no other.
+    fn settled(&self, mut curve: Curve<BeltPoint>) -> Curve<BeltPoint> {
+        let Diagram { path, mesh, .. } = &self.diagram;
+        let is_unsettled = |station: &Station<BeltPoint>| {
+            let scenario = path.at(station.parameter);
+            let program = scenario.and_then(|s| Some((mesh.program(&s)?, s)));
+            program.is_none_or(|(program, scenario)| {
+                !is_settled(&scenario, &program, &station.at.point)
+            })
+        };
+        if let Some(first) = curve.stations.iter().position(is_unsettled) {
+            curve.stations.truncate(first);
+            curve.events.retain(|(state, _)| *state < first);
+            curve.end = End::Edges;
+        }
+        let reached = curve.stations.last().map(|station| station.parameter);
+        let is_open = matches!(curve.end, End::Event | End::Lost);
+        if is_open && reached.is_some_and(|place| is_taut_beyond(path, place)) {
+            // Through the flat belt it would go over into its mirror image.
+            curve.events.retain(|(_, event)| event.turn != Turn::Apex);
+            curve.end = End::Taut;
+        }
+        curve
+    }
+
     /// The stations of other branches that cross at an event, a little before it or beyond.
     ///
     /// From beside the event a push along the mode that is about to vanish leads over to them.
     fn crossing(
         &mut self,
         event: &solver::Event<BeltPoint>,
-        before: &Station<BeltPoint>,
+        before: &[Station<BeltPoint>],
     ) -> Vec<Station<BeltPoint>> {
+        /// As near to where a branch is its own mirror image a push off it begins.
+        const BEFORE: [f64; 4] = [5e-3, 1e-3, 2e-2, 2e-4];
         const BESIDE: [f64; 3] = [2e-3, 5e-4, 1e-2];
         /// Farther off it is none that crosses there.
         const NEAR: f64 = 0.2;
@@ -313,14 +351,14 @@ impl Search<'_, '_> {
             Turn::Fold => return Vec::new(),
             // A push off the branch, where it has not come close yet, leads to the one that it crosses.
             Turn::Apex => {
-                let others = self.continuation.others(before, &event.mode, proceed);
-                let is_other = |other: &Station<BeltPoint>| other.negative != before.negative;
-                return others
-                    .into_iter()
-                    .flatten()
-                    .flatten()
-                    .filter(is_other)
-                    .collect();
+                let mut found = BEFORE.into_iter().map(|far| {
+                    let before = before_by(far, event, before);
+                    let others = self.continuation.others(before, &event.mode, proceed);
+                    let is_other = |other: &Station<BeltPoint>| other.negative != before.negative;
+                    let others = others.into_iter().flatten().flatten().filter(is_other);
+                    others.collect::<Vec<_>>()
+                });
+                return found.find(|others| !others.is_empty()).unwrap_or_default();
             }
             Turn::Bifurcation => (),
         }
@@ -393,11 +431,10 @@ impl Search<'_, '_> {
             .continuation
             .descend(from, &event.mode, place, proceed)?;
         let scenario = self.diagram.path.at(place)?;
-        let program = program_of(&scenario, self.diagram.elements);
-        Some(Snapped {
-            place,
-            equilibrium: of_solution(&scenario, program, found),
-        })
+        let program = self.diagram.mesh.program(&scenario)?;
+        let equilibrium = of_solution(&scenario, program, found);
+        let is_converged = equilibrium.status == Status::Converged;
+        is_converged.then_some(Snapped { place, equilibrium })
     }
 }
 
@@ -421,8 +458,8 @@ fn kind(event: &solver::Event<BeltPoint>, crossing: &[Station<BeltPoint>]) -> Ki
     let beyond = |station: &&Station<BeltPoint>| station.parameter > event.parameter;
     match (event.turn, crossing.iter().filter(beyond).count()) {
         (Turn::Fold, _) => Kind::Fold,
+        (Turn::Apex | Turn::Bifurcation, _) if crossing.is_empty() => Kind::Bifurcation,
         (Turn::Apex, _) => Kind::Pitchfork,
-        (Turn::Bifurcation, _) if crossing.is_empty() => Kind::Bifurcation,
         (Turn::Bifurcation, 1) if crossing.len() == 2 => Kind::Transcritical,
         (Turn::Bifurcation, _) => Kind::Pitchfork,
     }
@@ -455,7 +492,7 @@ impl Diagram {
     pub fn scenario(&self, branch: usize, state: usize) -> Scenario {
         let place = self.branches[branch].states[state].place;
         let mut scenario = self.path.at(place).expect("it was solved there");
-        scenario.solver.elements = Some(self.elements);
+        scenario.solver.elements = Some(self.path.base().elements());
         scenario
     }
 
@@ -466,7 +503,8 @@ impl Diagram {
     /// If there is no such state.
     pub fn equilibrium(&self, branch: usize, state: usize) -> Equilibrium {
         let scenario = self.scenario(branch, state);
-        let program = program_of(&scenario, self.elements);
+        let program = self.mesh.program(&scenario);
+        let program = program.expect("it was solved there");
         let at = &self.branches[branch].states[state].at;
         let solution = solver::assess(&program, scenario.solver.tolerance, at);
         of_solution(&scenario, program, solution)

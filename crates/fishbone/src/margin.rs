@@ -1,10 +1,11 @@
 //! How far a support may move before the belt loses its stability.
 
-use crate::equilibrium::{Equilibrium, Status, excess_distance};
-use crate::follow::{Along, NoBranch};
+use crate::equilibrium::{Equilibrium, Mesh, Status, is_settled};
+use crate::follow::{NoBranch, is_taut_beyond};
 use crate::lie::{Pose, exp, log};
 use crate::path::{Motion, Path};
-use crate::solver::{Continuation, End, Events, Pace, Turn};
+use crate::program::{BeltPoint, BeltProgram};
+use crate::solver::{Continuation, End, Events, Family, Pace, Station, Turn};
 use nalgebra::{Vector3, Vector6};
 use std::ops::ControlFlow;
 use thiserror::Error;
@@ -49,15 +50,9 @@ pub enum NoMargin {
 /// The boundary of stability, as it is met along a direction.
 struct Boundary {
     margin: Margin,
-    /// Square to it, where it is a fold: the change of the support's reaction along the mode that vanishes.
-    normal: Option<Vector6<f64>>,
-}
-
-/// Whether the supports are out of the belt's reach a little beyond a place.
-fn is_taut_beyond(path: &Path, place: f64) -> bool {
-    const A_LITTLE: f64 = 0.02;
-    let beyond = path.at(place + A_LITTLE);
-    beyond.is_none_or(|scenario| excess_distance(&scenario).is_some())
+    /// The change of the support's reaction along the mode that vanishes, of norm 1: square to the boundary where that is a
+    /// fold; where others branch off, the way on which they come apart.
+    across: Option<Vector6<f64>>,
 }
 
 impl Equilibrium {
@@ -81,55 +76,136 @@ impl Equilibrium {
         Ok(found.map(|boundary| boundary.margin))
     }
 
-    /// The same to wherever it is nearest, as far as can be told: from the nearest place along either way of the six axes on
-    /// along the normal of the boundary there, until that is the way that was taken.
+    /// The same to wherever it is nearest, as far as can be told: from places along the six axes, and along the ways on which
+    /// the lowest eigenvalues of the second variation fall fastest, on along the normal of the boundary there, until that
+    /// is the way that was taken.
     ///
     /// # Errors
     ///
-    /// [`NoMargin`] unless the equilibrium is stable and the support holds all of a pose.
+    /// [`NoMargin`] unless the equilibrium is stable and the support holds all of a pose, and where it cannot be followed.
     pub fn margin(
         &self,
         support: usize,
         reach: f64,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Result<Option<Margin>, NoMargin> {
-        const ROUNDS: usize = 8;
-        const SAME: f64 = 1e-6;
-        let mut nearest: Option<Boundary> = None;
+        /// From so many of the nearest places the search goes on.
+        const REFINED: usize = 4;
+        /// As many times as far as the nearest place that is known it looks for others to go on from.
+        const FARTHER: f64 = 2.0;
+        /// So much to the side of a way that ends where others branch off.
+        const ASIDE: [f64; 2] = [0.3, -0.3];
+        let axes = (0..6).flat_map(|axis| [1.0, -1.0].map(|sign| sign * Vector6::ith(axis, 1.0)));
+        let steepest = self.falls(support, proceed)?;
+        let mut found = Vec::new();
         let mut lost = None;
-        for axis in 0..6 {
-            for sign in [1.0, -1.0] {
-                // Farther than what is known already there is nothing to find.
-                let reach = nearest.as_ref().map_or(reach, |b| b.margin.distance);
-                let direction = sign * Vector6::ith(axis, 1.0);
-                match self.boundary(support, &direction, reach, proceed) {
-                    Ok(found) => nearest = found.or(nearest),
-                    Err(NoMargin::Lost(share)) => lost = Some(share),
-                    Err(other) => return Err(other),
-                }
+        let mut look = |direction: &Vector6<f64>, found: &mut Vec<Boundary>| {
+            let nearest = found.first().map_or(reach, |b| FARTHER * b.margin.distance);
+            match self.boundary(support, direction, nearest.min(reach), proceed) {
+                Ok(boundary) => found.extend(boundary),
+                Err(NoMargin::Lost(share)) => lost = Some(share),
+                Err(other) => return Err(other),
             }
+            found.sort_by(|a, b| a.margin.distance.total_cmp(&b.margin.distance));
+            Ok(())
+        };
+        for direction in steepest.into_iter().chain(axes) {
+            look(&direction, &mut found)?;
         }
-        if let (None, Some(share)) = (&nearest, lost) {
+        // Where others branch off, the boundary has an edge: folds lie nearer to either side of it.
+        let edges = found.iter().filter(|b| !b.margin.is_fold).take(REFINED);
+        let beside = |edge: &Boundary| {
+            let across = edge.across?;
+            Some(ASIDE.map(|aside| (edge.margin.direction + aside * across).normalize()))
+        };
+        let sides: Vec<_> = edges.filter_map(beside).flatten().collect();
+        for direction in sides {
+            look(&direction, &mut found)?;
+        }
+        if let (true, Some(share)) = (found.is_empty(), lost) {
             return Err(NoMargin::Lost(share));
         }
+        found.truncate(REFINED);
+        let mut margins = Vec::new();
+        for boundary in found {
+            margins.push(self.nearest_from(support, boundary, proceed)?);
+        }
+        Ok(margins
+            .into_iter()
+            .min_by(|a, b| a.distance.total_cmp(&b.distance)))
+    }
+
+    /// From a place on the boundary of stability on along its normal, until that is the way that was taken.
+    fn nearest_from(
+        &self,
+        support: usize,
+        mut best: Boundary,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Result<Margin, NoMargin> {
+        const ROUNDS: usize = 16;
+        const SAME: f64 = 1e-6;
         for _ in 0..ROUNDS {
-            let Some(best) = &nearest else {
-                return Ok(None);
-            };
-            let Some(normal) = best.normal else {
+            let Some(normal) = best.across.filter(|_| best.margin.is_fold) else {
                 break;
             };
             let towards = normal * normal.dot(&best.margin.direction).signum();
             if 1.0 - towards.dot(&best.margin.direction) < SAME {
                 break;
             }
-            match self.boundary(support, &towards, best.margin.distance, proceed) {
-                Ok(Some(nearer)) => nearest = Some(nearer),
-                Ok(None) | Err(NoMargin::Lost(_)) => break,
-                Err(other) => return Err(other),
+            // All the way, or half of it where that leads to no nearer place.
+            let mut nearer = None;
+            for way in [towards, (towards + best.margin.direction).normalize()] {
+                nearer = match self.boundary(support, &way, best.margin.distance, proceed) {
+                    Ok(found) => found,
+                    Err(NoMargin::Lost(_)) => None,
+                    Err(other) => return Err(other),
+                };
+                if nearer.is_some() {
+                    break;
+                }
+            }
+            match nearer {
+                Some(nearer) => best = nearer,
+                None => break,
             }
         }
-        Ok(nearest.map(|boundary| boundary.margin))
+        Ok(best.margin)
+    }
+
+    /// Directions in which the lowest eigenvalues of the second variation fall fastest, by central differences.
+    fn falls(
+        &self,
+        support: usize,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Result<Vec<Vector6<f64>>, NoMargin> {
+        const STEP: f64 = 1e-3;
+        const LOWEST: usize = 2;
+        let mut gradients = [Vector6::zeros(); LOWEST];
+        for axis in 0..6 {
+            let mut values = [[0.0; LOWEST]; 2];
+            for (sign, values) in [1.0, -1.0].into_iter().zip(&mut values) {
+                let way = Way::new(self, support, &(sign * Vector6::ith(axis, 1.0)), STEP)?;
+                let solved = self.solved.as_ref().ok_or(NoBranch::NoMultipliers)?;
+                let continuation = way.continuation();
+                let modes = continuation
+                    .start(&solved.at, way.path.length(), true)
+                    .and_then(|station| continuation.modes(&station, LOWEST));
+                let Some(modes) = modes.filter(|modes| modes.len() == LOWEST) else {
+                    return Ok(Vec::new());
+                };
+                *values = [0, 1].map(|i| modes[i].eigenvalue);
+                if proceed().is_break() {
+                    return Ok(Vec::new());
+                }
+            }
+            for (i, gradient) in gradients.iter_mut().enumerate() {
+                gradient[axis] = values[0][i] - values[1][i];
+            }
+        }
+        let falling = gradients
+            .into_iter()
+            .filter(|gradient| gradient.norm() > 0.0);
+        Ok(falling.map(|gradient| -gradient.normalize()).collect())
     }
 
     /// Where stability is lost along a direction of norm 1.
@@ -140,62 +216,37 @@ impl Equilibrium {
         reach: f64,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Result<Option<Boundary>, NoMargin> {
-        const PACE: Pace = Pace {
-            longest: 0.05,
-            stations: 300,
-            events: Events::EndAtFirst,
-        };
+        let way = Way::new(self, support, direction, reach)?;
         let solved = self.solved.as_ref().ok_or(NoBranch::NoMultipliers)?;
-        if self.status != Status::Converged {
-            return Err(NoBranch::NotConverged(self.message.clone()).into());
-        }
-        if self.stable() != Some(true) {
-            return Err(NoMargin::NotStable);
-        }
-        let held = self.scenario.supports.get(support);
-        let held = held.and_then(|held| {
-            held.point()
-                .zip(held.frame())
-                .filter(|_| held.hinge.is_none())
-        });
-        let (position, frame) = held.ok_or(NoMargin::NotClamped(support))?;
-        let moved = |far: f64| Pose {
-            position: position + far * solved.units.length * direction.fixed_rows::<3>(0),
-            frame: exp(&(far * direction.fixed_rows::<3>(3))) * frame,
-        };
-        let end = moved(reach);
-        let poses = [(end.position, log(&end.frame))];
-        let path = Path::poses(&self.scenario, support, &poses, Motion::Straight);
-        let path = path.map_err(|_| NoMargin::NotClamped(support))?;
-        let family = Along {
-            path: &path,
-            elements: self.scenario.elements(),
-            nodes: solved.at.point.poses.len(),
-        };
-        let tolerance = self.scenario.solver.tolerance;
-        let continuation = Continuation::new(&family, tolerance, [0.0, 1.0], PACE);
+        let continuation = way.continuation();
         let start = continuation.start(&solved.at, 0.0, true);
         let start = start.ok_or(NoBranch::Singular)?;
         let curve = continuation.trace(start, &mut |_| proceed());
-        let reached = curve
+        let length = way.path.length();
+        let is_open = |station: &Station<BeltPoint>| station.negative == 0 && way.holds(station);
+        let stable = curve
             .stations
+            .iter()
+            .take_while(|station| is_open(station))
+            .count();
+        let last = curve.stations[..stable]
             .last()
             .map_or(0.0, |station| station.parameter);
-        let Some((_, event)) = curve
-            .events
-            .first()
-            .filter(|(_, event)| event.negative[0] == 0)
+        let event = curve.events.first().filter(|(state, _)| *state <= stable);
+        let is_taut = is_taut_beyond(&way.path, last);
+        let Some((_, event)) = event.filter(|(_, event)| event.turn != Turn::Apex || !is_taut)
         else {
+            let goes_on = stable == curve.stations.len();
             return match curve.end {
-                End::Lost | End::Budget if !is_taut_beyond(&path, reached) => {
-                    Err(NoMargin::Lost(reached))
-                }
-                _ => Ok(None),
+                End::Range | End::Interrupted if goes_on => Ok(None),
+                _ if is_taut => Ok(None),
+                _ => Err(NoMargin::Lost(last / length)),
             };
         };
-        let pose = moved(event.parameter * reach);
+        let distance = event.parameter / length * reach;
+        let pose = way.pose_at(distance);
         let rows = continuation.multipliers_along(event);
-        let normal = rows.filter(|_| event.turn == Turn::Fold).map(|rows| {
+        let across = rows.map(|rows| {
             let held = &solved.program.supports[support];
             let at = &event.station.at.point.poses[held.node];
             let (force, moment) = held.reaction(at, &rows[support]);
@@ -203,13 +254,105 @@ impl Equilibrium {
         });
         Ok(Some(Boundary {
             margin: Margin {
-                distance: event.parameter * reach,
+                distance,
                 direction: *direction,
                 is_fold: event.turn == Turn::Fold,
                 position: pose.position,
                 rotation: log(&pose.frame),
             },
-            normal,
+            across,
         }))
+    }
+}
+
+/// A support's way along a direction of norm 1.
+struct Way {
+    path: Path,
+    mesh: Mesh,
+    from: Pose,
+    direction: Vector6<f64>,
+    /// U.
+    length: f64,
+}
+
+impl Way {
+    /// So far, in legs that turn by less than half a turn.
+    fn new(
+        equilibrium: &Equilibrium,
+        support: usize,
+        direction: &Vector6<f64>,
+        reach: f64,
+    ) -> Result<Self, NoMargin> {
+        const LEG: f64 = 3.0;
+        let solved = equilibrium.solved.as_ref().ok_or(NoBranch::NoMultipliers)?;
+        if equilibrium.status != Status::Converged {
+            return Err(NoBranch::NotConverged(equilibrium.message.clone()).into());
+        }
+        if equilibrium.stable() != Some(true) {
+            return Err(NoMargin::NotStable);
+        }
+        let scenario = &equilibrium.scenario;
+        let held = scenario.supports.get(support);
+        let held = held.filter(|held| held.hinge.is_none());
+        let held = held.and_then(|held| held.point().zip(held.frame()));
+        let (position, frame) = held.ok_or(NoMargin::NotClamped(support))?;
+        let from = Pose { frame, position };
+        let length = solved.units.length;
+        let legs = (reach * direction.fixed_rows::<3>(3).norm() / LEG)
+            .ceil()
+            .max(1.0);
+        let ends = (1..=legs as usize).map(|leg| {
+            let end = displaced(&from, direction, length, reach * leg as f64 / legs);
+            (end.position, log(&end.frame))
+        });
+        let poses: Vec<_> = ends.collect();
+        let path = Path::poses(scenario, support, &poses, Motion::Straight);
+        Ok(Self {
+            path: path.map_err(|_| NoMargin::NotClamped(support))?,
+            mesh: Mesh::of(scenario, &solved.program),
+            from,
+            direction: *direction,
+            length,
+        })
+    }
+
+    /// The support's pose so far along.
+    fn pose_at(&self, far: f64) -> Pose {
+        displaced(&self.from, &self.direction, self.length, far)
+    }
+
+    fn continuation(&self) -> Continuation<'_, Self> {
+        const PACE: Pace = Pace {
+            longest: 0.05,
+            stations: 1000,
+            events: Events::EndAtFirst,
+        };
+        let tolerance = self.path.base().solver.tolerance;
+        Continuation::new(self, tolerance, [0.0, self.path.length()], PACE)
+    }
+
+    /// Whether the ribs are held by the edges that they reach, and by no other.
+    fn holds(&self, station: &Station<BeltPoint>) -> bool {
+        let scenario = self.path.at(station.parameter);
+        let program = scenario.and_then(|scenario| Some((self.mesh.program(&scenario)?, scenario)));
+        program
+            .is_some_and(|(program, scenario)| is_settled(&scenario, &program, &station.at.point))
+    }
+}
+
+/// A pose so far along a direction, lengths in a unit.
+fn displaced(from: &Pose, direction: &Vector6<f64>, unit: f64, far: f64) -> Pose {
+    let [shift, turn] = [0, 3].map(|i| far * direction.fixed_rows::<3>(i).into_owned());
+    Pose {
+        position: from.position + unit * shift,
+        frame: exp(&turn) * from.frame,
+    }
+}
+
+impl Family for Way {
+    type Program = BeltProgram;
+
+    fn at(&self, place: f64) -> Option<BeltProgram> {
+        self.mesh.program(&self.path.at(place)?)
     }
 }

@@ -36,7 +36,21 @@ impl<'a> Assembly<'a> {
     /// Its supports are those of the scenario in their order, or one at the start where there is none; its links are
     /// those of the scenario, then the seam of a closed belt.
     pub(super) fn program(&self, count: usize) -> BeltProgram {
-        let pieces = self.belt.pieces(count, &self.breaks());
+        self.program_of(self.belt.pieces(count, &self.breaks()))
+    }
+
+    /// How many elements every stretch of the belt has on a mesh of about `count`.
+    pub(super) fn shares(&self, count: usize) -> Vec<usize> {
+        self.belt.shares(count, &self.breaks())
+    }
+
+    /// The programme with so many elements to every stretch; `None` where there are not as many stretches.
+    pub(super) fn program_shared(&self, shares: &[usize]) -> Option<BeltProgram> {
+        let pieces = self.belt.pieces_shared(shares, &self.breaks())?;
+        Some(self.program_of(pieces))
+    }
+
+    fn program_of(&self, pieces: Vec<program::Piece>) -> BeltProgram {
         let mut bare = BeltProgram::new(pieces, self.scenario.energy);
         bare.half_turns = self.belt.half_turns;
         let places = Places::of(&bare);

@@ -89,6 +89,10 @@ pub enum End {
     Budget,
     /// No step, however short, leads on.
     Lost,
+    /// Ribs reach edges beside a bend that held none before, or leave those that held them.
+    Edges,
+    /// The belt is drawn straight.
+    Taut,
     /// The caller asked to end.
     Interrupted,
 }
@@ -192,13 +196,7 @@ where
                 break;
             }
             let step = self.advance(last, &mut length);
-            let Some(step) = step.or_else(|| {
-                if std::env::var("NR").is_ok() {
-                    None
-                } else {
-                    self.round_kink(last, &mut length)
-                }
-            }) else {
+            let Some(step) = step.or_else(|| self.round_kink(last, &mut length)) else {
                 curve.end = End::Lost;
                 break;
             };
@@ -580,7 +578,7 @@ where
     }
 
     /// The lowest modes at a station.
-    fn modes(&self, station: &Station<PointOf<F>>, count: usize) -> Option<Vec<Mode>> {
+    pub fn modes(&self, station: &Station<PointOf<F>>, count: usize) -> Option<Vec<Mode>> {
         let program = self.family.at(station.parameter)?;
         let kkt = Kkt::factorise_any(&program, &mut station.at.clone()).ok()?;
         lowest_modes_of(kkt, count).ok()
