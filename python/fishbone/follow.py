@@ -47,7 +47,8 @@ class Poses(NamedTuple):
     support: Place = "end"
     """Which support, named as for `Equilibrium.reaction`; it must hold a position and a rotation."""
     motion: Literal["straight", "screw"] = "straight"
-    """From one pose to the next: the point on a straight line and the frame about a fixed axis, or both as a screw."""
+    """From one pose to the next: the point on a straight line and the frame about a fixed axis, or both as a screw; by
+    the shorter turn either way."""
 
 
 class Origin(NamedTuple):
