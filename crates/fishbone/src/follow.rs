@@ -345,15 +345,13 @@ impl Search<'_, '_> {
         const BESIDE: [f64; 3] = [2e-3, 5e-4, 1e-2];
         /// Farther off it is none that crosses there.
         const NEAR: f64 = 0.2;
-        let branch = self.diagram.branches.len();
-        let proceed = &mut |_| (self.proceed)(branch, event.parameter);
         match event.turn {
             Turn::Fold => return Vec::new(),
             // A push off the branch, where it has not come close yet, leads to the one that it crosses.
             Turn::Apex => {
                 let mut found = BEFORE.into_iter().map(|far| {
                     let before = before_by(far, event, before);
-                    let others = self.continuation.others(before, &event.mode, proceed);
+                    let others = self.pushed_off(before, &event.mode);
                     let is_other = |other: &Station<BeltPoint>| other.negative != before.negative;
                     let others = others.into_iter().flatten().flatten().filter(is_other);
                     others.collect::<Vec<_>>()
@@ -368,8 +366,7 @@ impl Search<'_, '_> {
                 let Some(beside) = self.continuation.beside(event, by) else {
                     continue;
                 };
-                let proceed = &mut |_| (self.proceed)(branch, event.parameter);
-                let others = self.continuation.others(&beside, &event.mode, proceed);
+                let others = self.pushed_off(&beside, &event.mode);
                 let near =
                     |other: &Station<BeltPoint>| other.at.point.distance(&beside.at.point) < NEAR;
                 found.extend(others.into_iter().flatten().flatten().filter(near));
@@ -379,6 +376,28 @@ impl Search<'_, '_> {
             }
         }
         Vec::new()
+    }
+
+    /// The stations on other branches that are reached from one, at its place, by a push along a mode and against it.
+    fn pushed_off(
+        &mut self,
+        from: &Station<BeltPoint>,
+        mode: &solver::Mode,
+    ) -> Option<[Option<Station<BeltPoint>>; 2]> {
+        let Self {
+            continuation,
+            proceed,
+            diagram: Diagram { path, mesh, .. },
+        } = self;
+        let branch = self.diagram.branches.len();
+        let program = mesh.program(&path.at(from.parameter)?)?;
+        let tolerance = path.base().solver.tolerance;
+        let mut pushed = |forth| {
+            let ask = &mut |_| proceed(branch, from.parameter);
+            let at = solver::pushed_over(&program, tolerance, &from.at, mode, forth, ask)?;
+            continuation.start(&at, from.parameter, true)
+        };
+        Some([pushed(true), pushed(false)])
     }
 
     /// Which ways to follow a branch from a station beside an event: away from where it crosses, or both where it is the one

@@ -6,10 +6,12 @@
 //!
 //! Source of the method: H. B. Keller, "Numerical solution of bifurcation and nonlinear eigenvalue problems" (1977).
 
+mod event;
+mod kink;
+
 use super::chain::NodeVector;
 use super::kkt::KktVector;
 use super::modes::{lowest_modes_of, moved};
-use super::push::pushed_over;
 use super::{BOUNDS, Kkt, Program, Residuals, Rows, Settings, Shape, Stationary};
 use super::{Mode, Solution};
 use super::{assess, larger, minimise};
@@ -229,26 +231,6 @@ where
         self.station(at, arrival, None)
     }
 
-    /// The stations on other curves that are reached from one, at its parameter, by a push along a mode and against it.
-    pub fn others(
-        &self,
-        from: &Station<PointOf<F>>,
-        mode: &Mode,
-        proceed: &mut dyn FnMut(f64) -> ControlFlow<()>,
-    ) -> Option<[Option<Station<PointOf<F>>>; 2]>
-    where
-        F::Program: Clone,
-    {
-        let program = self.family.at(from.parameter)?;
-        let mut found = |forth| {
-            let at = pushed_over(&program, self.tolerance, &from.at, mode, forth, proceed)?;
-            let mut at = at;
-            let arrival = self.correct(&mut at, from.parameter, None)?;
-            self.station(at, arrival, None)
-        };
-        Some([found(true), found(false)])
-    }
-
     /// How the constraints' multipliers change along the mode of an event.
     pub fn multipliers_along(&self, event: &Event<PointOf<F>>) -> Option<Vec<Rows>> {
         let program = self.family.at(event.station.parameter)?;
@@ -341,127 +323,6 @@ where
         }
     }
 
-    /// The station beyond a kink, where an inequality is taken up or given up at once and no step along the curve leads on.
-    ///
-    /// With softer inequalities the curve is round there: it is followed until it is near enough to the sharp one again.
-    fn round_kink(&self, last: &Station<PointOf<F>>, length: &mut f64) -> Option<Step<PointOf<F>>> {
-        const SOFTER: [f64; 4] = [1e1, 1e2, 1e3, 1e4];
-        /// Where the soft curve is taken up: that far before the kink, as it cuts the corner.
-        const BACK: [f64; 2] = [3e-3, 1e-2];
-        let mut ways = SOFTER
-            .into_iter()
-            .flat_map(|softness| BACK.map(|back| (softness, back)));
-        let beyond = ways.find_map(|(softness, back)| self.beyond_kink(last, softness, back))?;
-        *length = 0.1 * self.pace.longest;
-        let event = match self.pace.events {
-            Events::Ignore => None,
-            Events::Find | Events::EndAtFirst => self.event_at_kink(last, &beyond),
-        };
-        let [low, high] = self.range;
-        Some(Step {
-            arrived: beyond.parameter <= low || beyond.parameter >= high,
-            station: beyond,
-            event,
-        })
-    }
-
-    /// The first station beyond a kink to which the curve with softer inequalities leads.
-    fn beyond_kink(
-        &self,
-        last: &Station<PointOf<F>>,
-        softness: f64,
-        back: f64,
-    ) -> Option<Station<PointOf<F>>> {
-        const FIRST: f64 = 1e-4;
-        const MOST: usize = 100;
-        let soft = self.softened(softness);
-        let [low, high] = self.range;
-        let before = self
-            .step(last, &last.tangent, -back)
-            .filter(|before| (low..=high).contains(&before.parameter))?;
-        let mut station = soft.step(&before, &before.tangent, 0.0)?;
-        let mut length = FIRST;
-        for _ in 0..MOST {
-            let step = soft.advance(&station, &mut length)?;
-            station = step.station;
-            let sharp = self.sharpened(&station, softness, step.arrived);
-            if step.arrived {
-                return sharp;
-            }
-            let sharp = sharp.filter(|sharp| self.leads_away(sharp, last));
-            if sharp.is_some() {
-                return sharp;
-            }
-        }
-        None
-    }
-
-    /// The station with the inequalities as they are, next to one with softer ones: square to the curve, or at its parameter.
-    fn sharpened(
-        &self,
-        from: &Station<PointOf<F>>,
-        softness: f64,
-        at_parameter: bool,
-    ) -> Option<Station<PointOf<F>>> {
-        const SHARPER: f64 = 0.1;
-        let mut station = from.clone();
-        let mut softness = softness;
-        while softness > 1.0 {
-            softness = (SHARPER * softness).max(1.0);
-            let sharper = self.softened(softness);
-            let mut at = station.at.clone();
-            let square = (!at_parameter).then_some((&from.tangent, 0.0));
-            let arrival = sharper.correct(&mut at, station.parameter, square)?;
-            station = sharper.station(at, arrival, Some(&from.tangent))?;
-        }
-        Some(station)
-    }
-
-    /// Whether the curve leads on from a station, and away from another.
-    fn leads_away(&self, from: &Station<PointOf<F>>, other: &Station<PointOf<F>>) -> bool {
-        const SHORT: f64 = 0.1;
-        let way = from.at.point.distance(&other.at.point);
-        let next = self.step(from, &from.tangent, (SHORT * way).max(SHORTEST));
-        next.is_some_and(|next| next.at.point.distance(&other.at.point) > way)
-    }
-
-    /// What happens at a kink.
-    fn event_at_kink(
-        &self,
-        before: &Station<PointOf<F>>,
-        beyond: &Station<PointOf<F>>,
-    ) -> Option<Event<PointOf<F>>> {
-        let turn = match before.turn_before(beyond)? {
-            Turn::Apex => Turn::Fold,
-            turn => turn,
-        };
-        let crossing = before.negative.min(beyond.negative) + 1;
-        let mode = self
-            .modes(before, crossing)?
-            .into_iter()
-            .nth(crossing - 1)?;
-        Some(Event {
-            turn,
-            parameter: before.parameter,
-            station: before.clone(),
-            negative: [before.negative, beyond.negative],
-            mode,
-        })
-    }
-
-    /// The same with softer inequalities, and no eye for events.
-    fn softened(&self, softness: f64) -> Self {
-        Self {
-            family: self.family,
-            softness,
-            pace: Pace {
-                events: Events::Ignore,
-                ..self.pace
-            },
-            ..*self
-        }
-    }
-
     /// The station between two where the parameter has a value.
     fn land(
         &self,
@@ -480,101 +341,6 @@ where
         let mut at = nearer.at.clone();
         let arrival = self.correct(&mut at, parameter, None)?;
         self.station(at, arrival, Some(&to.tangent))
-    }
-
-    /// What happens between two stations, and where.
-    ///
-    /// The place is bracketed and closed in on by the secant. Very near to it the system is all but singular, and no step may
-    /// lead there any more; what is sought is smooth, so that the last secant tells the rest.
-    fn event_between(
-        &self,
-        from: &Station<PointOf<F>>,
-        to: &Station<PointOf<F>>,
-        length: f64,
-    ) -> Option<Event<PointOf<F>>> {
-        const ITERATIONS: usize = 30;
-        /// As close in the parameter as is worth while.
-        const CLOSE: f64 = 1e-9;
-        /// Where the last steps lead no nearer than this, what is sought need not be smooth in between.
-        const SHARP: f64 = 1e-5;
-        /// Where to look instead, between the two, where no step leads to the place.
-        const SHARES: [f64; 5] = [0.5, 0.25, 0.75, 0.1, 0.9];
-        let turn = from.turn_before(to)?;
-        let crossing = from.negative.min(to.negative) + 1;
-        // What changes its sign.
-        let place = |length: f64, station: Station<PointOf<F>>| {
-            let value = match turn {
-                Turn::Fold | Turn::Apex => station.tangent.parameter,
-                Turn::Bifurcation => {
-                    let modes = self.modes(&station, crossing)?;
-                    let size = modes.get(crossing - 1)?.eigenvalue.abs();
-                    if station.negative < crossing {
-                        size
-                    } else {
-                        -size
-                    }
-                }
-            };
-            Some(Place {
-                length,
-                value,
-                station,
-            })
-        };
-        let mut low = place(0.0, from.clone())?;
-        let mut high = place(length, to.clone())?;
-        let (mut weights, mut stays) = ([1.0, 1.0], None);
-        for _ in 0..ITERATIONS {
-            let (a, b) = (weights[0] * low.value, weights[1] * high.value);
-            let next = low.length - a * (high.length - low.length) / (b - a);
-            let is_close = match turn {
-                Turn::Fold | Turn::Apex => {
-                    low.value.abs().min(high.value.abs()) * (high.length - low.length)
-                }
-                Turn::Bifurcation => (high.station.parameter - low.station.parameter).abs(),
-            };
-            if is_close < CLOSE {
-                break;
-            }
-            let aside = SHARES.map(|share| low.length + share * (high.length - low.length));
-            let mut nexts = std::iter::once(next).chain(aside);
-            let next = nexts.find_map(|next| {
-                let station = self.step(from, &from.tangent, next)?;
-                place(next, station)
-            });
-            let Some(next) = next else {
-                break;
-            };
-            // The end that stays a second time counts for less, lest it stay for ever.
-            let is_low = (next.value < 0.0) == (low.value < 0.0);
-            weights = match (is_low, stays) {
-                (true, Some(true)) => [1.0, 0.5 * weights[1]],
-                (false, Some(false)) => [0.5 * weights[0], 1.0],
-                _ => [1.0, 1.0],
-            };
-            stays = Some(is_low);
-            match is_low {
-                true => low = next,
-                false => high = next,
-            }
-        }
-        let share = low.value / (low.value - high.value);
-        let [a, b] = [&low, &high].map(|place| place.station.parameter);
-        let nearest = if share < 0.5 { low } else { high };
-        let is_sharp = (b - a).abs() < SHARP;
-        let parameter = match turn {
-            Turn::Bifurcation if is_sharp => a + share * (b - a),
-            _ => nearest.station.parameter,
-        };
-        let mode = self.modes(&nearest.station, crossing)?;
-        let mode = mode.into_iter().nth(crossing - 1)?;
-        Some(Event {
-            turn,
-            parameter,
-            negative: [from.negative, to.negative],
-            mode,
-            station: nearest.station,
-        })
     }
 
     /// The lowest modes at a station.
@@ -762,13 +528,6 @@ struct Step<X> {
     station: Station<X>,
     event: Option<Event<X>>,
     arrived: bool,
-}
-
-/// A station so far along a step, and the value there of what is zero at an event.
-struct Place<X> {
-    length: f64,
-    value: f64,
-    station: Station<X>,
 }
 
 /// Where Newton's method has converged, factorised there.

@@ -1,0 +1,134 @@
+//! Round the corners of a curve, where an inequality is taken up or given up at once.
+
+use super::super::Shape;
+use super::{Continuation, Event, Events, Family, Pace, PointOf, SHORTEST, Station, Step, Turn};
+
+impl<F: Family> Continuation<'_, F>
+where
+    PointOf<F>: Shape,
+{
+    /// The station beyond a kink, where an inequality is taken up or given up at once and no step along the curve leads on.
+    ///
+    /// With softer inequalities the curve is round there: it is followed until it is near enough to the sharp one again.
+    pub(super) fn round_kink(
+        &self,
+        last: &Station<PointOf<F>>,
+        length: &mut f64,
+    ) -> Option<Step<PointOf<F>>> {
+        const SOFTER: [f64; 4] = [1e1, 1e2, 1e3, 1e4];
+        /// Where the soft curve is taken up: that far before the kink, as it cuts the corner.
+        const BACK: [f64; 2] = [3e-3, 1e-2];
+        let mut ways = SOFTER
+            .into_iter()
+            .flat_map(|softness| BACK.map(|back| (softness, back)));
+        let beyond = ways.find_map(|(softness, back)| self.beyond_kink(last, softness, back))?;
+        *length = 0.1 * self.pace.longest;
+        let event = match self.pace.events {
+            Events::Ignore => None,
+            Events::Find | Events::EndAtFirst => self.event_at_kink(last, &beyond),
+        };
+        let [low, high] = self.range;
+        Some(Step {
+            arrived: beyond.parameter <= low || beyond.parameter >= high,
+            station: beyond,
+            event,
+        })
+    }
+
+    /// The first station beyond a kink to which the curve with softer inequalities leads.
+    fn beyond_kink(
+        &self,
+        last: &Station<PointOf<F>>,
+        softness: f64,
+        back: f64,
+    ) -> Option<Station<PointOf<F>>> {
+        const FIRST: f64 = 1e-4;
+        const MOST: usize = 100;
+        let soft = self.softened(softness);
+        let [low, high] = self.range;
+        let before = self
+            .step(last, &last.tangent, -back)
+            .filter(|before| (low..=high).contains(&before.parameter))?;
+        let mut station = soft.step(&before, &before.tangent, 0.0)?;
+        let mut length = FIRST;
+        for _ in 0..MOST {
+            let step = soft.advance(&station, &mut length)?;
+            station = step.station;
+            let sharp = self.sharpened(&station, softness, step.arrived);
+            if step.arrived {
+                return sharp;
+            }
+            let sharp = sharp.filter(|sharp| self.leads_away(sharp, last));
+            if sharp.is_some() {
+                return sharp;
+            }
+        }
+        None
+    }
+
+    /// The station with the inequalities as they are, next to one with softer ones: square to the curve, or at its parameter.
+    fn sharpened(
+        &self,
+        from: &Station<PointOf<F>>,
+        softness: f64,
+        at_parameter: bool,
+    ) -> Option<Station<PointOf<F>>> {
+        const SHARPER: f64 = 0.1;
+        let mut station = from.clone();
+        let mut softness = softness;
+        while softness > 1.0 {
+            softness = (SHARPER * softness).max(1.0);
+            let sharper = self.softened(softness);
+            let mut at = station.at.clone();
+            let square = (!at_parameter).then_some((&from.tangent, 0.0));
+            let arrival = sharper.correct(&mut at, station.parameter, square)?;
+            station = sharper.station(at, arrival, Some(&from.tangent))?;
+        }
+        Some(station)
+    }
+
+    /// Whether the curve leads on from a station, and away from another.
+    fn leads_away(&self, from: &Station<PointOf<F>>, other: &Station<PointOf<F>>) -> bool {
+        const SHORT: f64 = 0.1;
+        let way = from.at.point.distance(&other.at.point);
+        let next = self.step(from, &from.tangent, (SHORT * way).max(SHORTEST));
+        next.is_some_and(|next| next.at.point.distance(&other.at.point) > way)
+    }
+
+    /// What happens at a kink.
+    fn event_at_kink(
+        &self,
+        before: &Station<PointOf<F>>,
+        beyond: &Station<PointOf<F>>,
+    ) -> Option<Event<PointOf<F>>> {
+        let turn = match before.turn_before(beyond)? {
+            Turn::Apex => Turn::Fold,
+            turn => turn,
+        };
+        let crossing = before.negative.min(beyond.negative) + 1;
+        let mode = self
+            .modes(before, crossing)?
+            .into_iter()
+            .nth(crossing - 1)?;
+        Some(Event {
+            turn,
+            parameter: before.parameter,
+            station: before.clone(),
+            negative: [before.negative, beyond.negative],
+            mode,
+        })
+    }
+
+    /// The same with softer inequalities, and no eye for events.
+    fn softened(&self, softness: f64) -> Self {
+        Self {
+            family: self.family,
+            softness,
+            pace: Pace {
+                events: Events::Ignore,
+                ..self.pace
+            },
+            ..*self
+        }
+    }
+}
