@@ -362,17 +362,9 @@ def main() -> None:
             save(gallery(name), f"gallery_{name}")
     with mpl.rc_context(STYLE | {"axes.grid": False, "savefig.dpi": 150.0}):
         save(gallery_shapes(), "gallery_shapes")
-    for draw in (
-        examples,
-        convergence,
-        bound,
-        bend_radius,
-        continuation,
-        shear_diagrams,
-        shell_thickness,
-        collocation,
-        locking,
-    ):
+    with mpl.rc_context(STYLE | {"savefig.dpi": 150.0}):
+        save(shear_diagrams(), "shear_diagrams")
+    for draw in (examples, convergence, bound, bend_radius, continuation, shell_thickness, collocation, locking):
         with mpl.rc_context(STYLE):
             save(draw(), draw.__name__)
 
