@@ -418,7 +418,8 @@ class Equilibrium:
 
         Shapes: direction (6,).
         Errors: `NoSupport`; `NoMargin` unless the equilibrium is stable, and where it can be followed only a part of
-        `reach` without losing its stability; `InvalidArgument` for what is no direction or reach.
+        `reach` without losing its stability: along a direction always, without one if nothing else is found;
+        `InvalidArgument` for what is no direction or reach.
         """
         if not (np.ndim(reach) == 0 and 0.0 < reach <= MAX_REACH):
             raise InvalidArgument(f"reach: found {reach!r}, allowed above 0 and up to {MAX_REACH:g}, in U and rad")

@@ -190,7 +190,8 @@ impl Family for Along<'_> {
 
 /// Whether the supports are out of the belt's reach next to a place.
 pub(crate) fn is_taut_beyond(path: &Path, place: f64) -> bool {
-    const A_LITTLE: f64 = 0.02;
+    /// Of what may be a long way.
+    const A_LITTLE: f64 = 2e-3;
     let beside = [place - A_LITTLE, place + A_LITTLE].map(|place| path.at(place));
     let mut known = beside.iter().flatten();
     known.any(|scenario| excess_distance(scenario).is_some())
