@@ -1,0 +1,123 @@
+//! The logarithmic barrier: what keeps slacks and their multipliers positive.
+
+use crate::layout::Layout;
+use crate::program::Values;
+use crate::{larger, largest};
+
+/// A barrier on all slacks, each with its weight.
+#[derive(Debug, Clone)]
+pub(crate) struct Barrier {
+    /// Barrier parameter, an objective per unit weight.
+    pub(crate) parameter: f64,
+    /// Weight of every slack.
+    weights: Vec<f64>,
+    /// The largest weight of a stage.
+    heaviest: f64,
+    /// Rows of every stage, then of every other inequality, by which logarithms are summed up.
+    stages: Vec<std::ops::Range<usize>>,
+}
+
+/// Lengths that a step may go: along the unknowns, and along the inequalities' multipliers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Lengths {
+    pub(crate) primal: f64,
+    pub(crate) dual: f64,
+}
+
+impl Barrier {
+    pub(crate) fn new(parameter: f64, layout: &Layout) -> Self {
+        let others = layout.inequalities_at_stages()..layout.inequalities();
+        let stages = (0..layout.stages()).map(|stage| layout.stage_rows(stage));
+        Self {
+            parameter,
+            weights: layout.row_weights().to_vec(),
+            heaviest: largest(layout.stage_weights().iter().chain(layout.row_weights())),
+            stages: stages.chain(others.map(|row| row..row + 1)).collect(),
+        }
+    }
+
+    /// The largest weight.
+    pub(crate) fn heaviest(&self) -> f64 {
+        self.heaviest
+    }
+
+    /// The product of slack and multiplier on the central path.
+    pub(crate) fn target(&self, row: usize) -> f64 {
+        self.parameter * self.weights[row]
+    }
+
+    /// Barrier function: the objective less the weighted logarithms of the slacks.
+    pub(crate) fn merit(&self, values: &Values) -> f64 {
+        let of_stage = |rows: &std::ops::Range<usize>| {
+            let logarithms = values.slacks[rows.clone()].iter().map(|slack| slack.ln());
+            self.weights
+                .get(rows.start)
+                .map_or(0.0, |weight| weight * logarithms.sum::<f64>())
+        };
+        let logarithms: f64 = self.stages.iter().map(of_stage).sum();
+        values.objective - self.parameter * logarithms
+    }
+
+    /// The largest difference of slack times multiplier from `parameter` times its weight.
+    pub(crate) fn complementarity(
+        &self,
+        parameter: f64,
+        slacks: &[f64],
+        multipliers: &[f64],
+    ) -> f64 {
+        let rows = multipliers.iter().zip(slacks).zip(&self.weights);
+        rows.fold(0.0, |most, ((multiplier, slack), weight)| {
+            larger(most, (multiplier * slack - parameter * weight).abs())
+        })
+    }
+
+    /// The next lower parameter, at least `least`.
+    pub(crate) fn lower(&mut self, least: f64) {
+        self.parameter = least.max((0.2 * self.parameter).min(self.parameter.powf(1.5)));
+    }
+
+    /// Step of the multipliers along which every product comes to the central path, and the lengths that keep slacks and
+    /// multipliers positive.
+    pub(crate) fn find_step(
+        &self,
+        slacks: &[f64],
+        multipliers: &[f64],
+        rates: &[f64],
+        stiffness: &[f64],
+        steps: &mut [f64],
+    ) -> Lengths {
+        let keep = (1.0 - self.parameter).clamp(0.99, 1.0 - 1e-9);
+        let mut lengths = Lengths {
+            primal: 1.0,
+            dual: 1.0,
+        };
+        for (row, step) in steps.iter_mut().enumerate() {
+            let (slack, multiplier, rate) = (slacks[row], multipliers[row], rates[row]);
+            let central = self.target(row) / slack;
+            *step = central - multiplier - stiffness[row] * rate;
+            if rate < 0.0 {
+                lengths.primal = lengths.primal.min(-keep * slack / rate);
+            }
+            if *step < 0.0 {
+                lengths.dual = lengths.dual.min(-keep * multiplier / *step);
+            }
+        }
+        lengths
+    }
+
+    /// Moves multipliers along their step, and back where they lie too far from the central path.
+    pub(crate) fn advance(
+        &self,
+        slacks: &[f64],
+        length: f64,
+        steps: &[f64],
+        multipliers: &mut [f64],
+    ) {
+        const SPREAD: f64 = 1e10;
+        for (row, multiplier) in multipliers.iter_mut().enumerate() {
+            let central = self.target(row) / slacks[row];
+            *multiplier =
+                (*multiplier + length * steps[row]).clamp(central / SPREAD, central * SPREAD);
+        }
+    }
+}

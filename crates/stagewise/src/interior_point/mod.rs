@@ -1,0 +1,305 @@
+//! Primal–dual interior-point minimisation: main loop.
+
+mod barrier;
+mod filter;
+mod line_search;
+mod primal_dual;
+mod restoration;
+
+pub(crate) use primal_dual::PrimalDual;
+
+use crate::larger;
+use crate::layout::Layout;
+use crate::linear::Inertia;
+use crate::program::{Program, Stationary, Values};
+use filter::{Filter, Measure};
+use line_search::SecondOrderCorrection;
+use restoration::Restoration;
+use std::ops::ControlFlow;
+
+/// Settings of the minimisation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Largest residual of a converged point.
+    pub tolerance: f64,
+    /// Most iterations.
+    pub iterations: usize,
+    /// First barrier parameter, an objective per unit weight.
+    pub barrier: f64,
+}
+
+/// Why the minimisation ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// All residuals are within the tolerance.
+    Converged,
+    /// The iteration limit was reached.
+    IterationLimit,
+    /// The violation of the equalities cannot be lowered any further.
+    LocallyInfeasible,
+    /// The equalities hold, and no step lowers the objective by more than rounding.
+    Stalled,
+    /// The objective is not bounded below, or not finite.
+    Unbounded,
+    /// The start is outside the domain.
+    Inadmissible,
+    /// The caller asked to end.
+    Interrupted,
+}
+
+/// Residuals of the first-order conditions, max-norms.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Residuals {
+    /// Gradient of the Lagrangian by the unknowns.
+    pub stationarity: f64,
+    /// Violation of the equalities.
+    pub constraint: f64,
+    /// Products of slacks and their multipliers.
+    pub complementarity: f64,
+}
+
+impl Residuals {
+    /// The largest of the three; NaN where one of them is.
+    pub fn largest(&self) -> f64 {
+        [self.stationarity, self.constraint, self.complementarity]
+            .into_iter()
+            .fold(0.0, larger)
+    }
+}
+
+/// Where the minimisation ended.
+#[derive(Debug, Clone)]
+pub struct Solution<P> {
+    /// The last point, with its multipliers.
+    pub at: Stationary<P>,
+    /// Its values.
+    pub values: Values,
+    /// Residuals there.
+    pub residuals: Residuals,
+    /// Iterations taken.
+    pub iterations: usize,
+    /// Why it ended.
+    pub outcome: Outcome,
+    /// Inertia of the second variation there; `None` where it cannot be decided.
+    pub inertia: Option<Inertia>,
+}
+
+impl<P> Solution<P> {
+    /// Whether it is a minimum, or not told from one.
+    pub fn is_minimum(&self) -> bool {
+        let descends = self.inertia.is_some_and(|inertia| inertia.negative > 0);
+        self.outcome == Outcome::Converged && !descends
+    }
+
+    /// The same with the iterations of an earlier search counted in.
+    #[must_use]
+    pub fn after(self, iterations: usize) -> Self {
+        Self {
+            iterations: self.iterations + iterations,
+            ..self
+        }
+    }
+}
+
+/// Minimises a programme from a point of its domain.
+///
+/// `proceed` is asked once an iteration whether to go on.
+pub fn minimise<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>(
+    program: &P,
+    settings: &Settings,
+    start: P::Point,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Solution<P::Point> {
+    let mut interior_point = InteriorPoint::new(program, *settings, start);
+    let outcome = interior_point.iterate(proceed);
+    interior_point.finish(outcome)
+}
+
+/// Residuals and inertia of a stationary point that was found by other means.
+pub fn assess<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>(
+    program: &P,
+    tolerance: f64,
+    at: &Stationary<P::Point>,
+) -> Solution<P::Point> {
+    let settings = Settings {
+        tolerance,
+        iterations: 0,
+        barrier: 0.0,
+    };
+    let mut interior_point = InteriorPoint::new(program, settings, at.point.clone());
+    let iterate = &mut interior_point.iterate;
+    iterate.multipliers.clone_from(&at.multipliers);
+    iterate.linearise();
+    let outcome = match iterate.residuals().largest() <= tolerance {
+        true => Outcome::Converged,
+        false => Outcome::IterationLimit,
+    };
+    interior_point.finish(outcome)
+}
+
+/// An objective below minus this, in its unit, has no least.
+const BOTTOMLESS: f64 = 1e12;
+
+/// A minimisation under way.
+struct InteriorPoint<'a, P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> {
+    iterate: PrimalDual<&'a P, X, U, N>,
+    settings: Settings,
+    /// Blocks of the equalities, by which their violation is summed up.
+    layout: Layout,
+    bottom: f64,
+    filter: Filter,
+    correction: SecondOrderCorrection<N>,
+    iteration: usize,
+    admissible: bool,
+    interrupted: bool,
+}
+
+impl<'a, P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>
+    InteriorPoint<'a, P, X, U, N>
+{
+    fn new(program: &'a P, settings: Settings, start: P::Point) -> Self {
+        let (iterate, admissible) = PrimalDual::new(program, settings.barrier, start);
+        let layout = iterate.kkt.layout().clone();
+        Self {
+            bottom: -BOTTOMLESS * program.scales().objective,
+            filter: Filter::new(violation(&layout, &iterate.values)),
+            correction: SecondOrderCorrection::new(&layout),
+            layout,
+            iterate,
+            settings,
+            iteration: 0,
+            admissible,
+            interrupted: false,
+        }
+    }
+
+    fn iterate(&mut self, proceed: &mut dyn FnMut() -> ControlFlow<()>) -> Outcome {
+        if !self.admissible {
+            return Outcome::Inadmissible;
+        }
+        loop {
+            let residuals = self.iterate.residuals();
+            if residuals.largest() <= self.settings.tolerance {
+                return Outcome::Converged;
+            }
+            if self.iterate.values.objective < self.bottom {
+                return Outcome::Unbounded;
+            }
+            if self.iteration >= self.settings.iterations {
+                return Outcome::IterationLimit;
+            }
+            if self.is_interrupted(proceed) {
+                return Outcome::Interrupted;
+            }
+            if self
+                .iterate
+                .lower_barrier(&residuals, self.settings.tolerance)
+            {
+                self.filter.clear();
+            }
+            self.iterate.assemble();
+            if self.iterate.kkt.factorise().is_err() {
+                return Outcome::Unbounded;
+            }
+            self.iterate.find_step();
+            if !self.search()
+                && let Some(outcome) = self.recover(proceed)
+            {
+                return outcome;
+            }
+            self.iterate.linearise();
+            self.iteration += 1;
+        }
+    }
+
+    /// Asks the caller, who need not say so twice.
+    fn is_interrupted(&mut self, proceed: &mut dyn FnMut() -> ControlFlow<()>) -> bool {
+        self.interrupted = self.interrupted || proceed().is_break();
+        self.interrupted
+    }
+
+    /// Goes on where the line search found nothing: toward the equalities, or where these hold without the filter's
+    /// memory; an outcome where neither is left.
+    fn recover(&mut self, proceed: &mut dyn FnMut() -> ControlFlow<()>) -> Option<Outcome> {
+        if violation(&self.layout, &self.iterate.values) > self.settings.tolerance {
+            return (!self.restore(proceed)).then_some(Outcome::LocallyInfeasible);
+        }
+        if self.filter.is_empty() {
+            return Some(Outcome::Stalled);
+        }
+        self.filter.clear();
+        self.iterate.centre();
+        None
+    }
+
+    /// Feasibility restoration: steps of least length toward the equalities until the filter takes the point; false where
+    /// their violation cannot be lowered.
+    fn restore(&mut self, proceed: &mut dyn FnMut() -> ControlFlow<()>) -> bool {
+        /// Share of the violation that is left where restoration may end.
+        const ENOUGH: f64 = 0.1;
+        let left = self.measure(&self.iterate.values);
+        self.filter.leave(left);
+        self.iterate.multipliers.equalities.fill(0.0);
+        let mut restoration = Restoration::new(&self.layout);
+        while self.iteration < self.settings.iterations && !self.is_interrupted(proceed) {
+            self.iteration += 1;
+            self.iterate.centre();
+            if !restoration.step(&mut self.iterate) {
+                self.iterate.linearise();
+                return false;
+            }
+            let now = self.measure(&self.iterate.values);
+            if now.violation <= ENOUGH * left.violation && self.filter.admits(now) {
+                self.iterate.centre();
+                return true;
+            }
+        }
+        true
+    }
+
+    fn finish(mut self, outcome: Outcome) -> Solution<P::Point> {
+        self.prefer_zero_multipliers();
+        let residuals = self.iterate.residuals();
+        let inertia = self.iterate.inertia();
+        Solution {
+            residuals,
+            at: Stationary {
+                point: self.iterate.point,
+                multipliers: self.iterate.multipliers,
+            },
+            values: self.iterate.values,
+            iterations: self.iteration,
+            outcome,
+            inertia,
+        }
+    }
+
+    /// Drops multipliers that stationarity does not need: where equalities depend on each other they are not unique.
+    ///
+    /// A loose tolerance must not do so: it would call small forces none.
+    fn prefer_zero_multipliers(&mut self) {
+        const NONE: f64 = 1e-8;
+        let iterate = &mut self.iterate;
+        if iterate.stationarity_without_equalities() <= NONE.min(self.settings.tolerance) {
+            iterate.multipliers.equalities.fill(0.0);
+            iterate.linearise();
+        }
+    }
+
+    /// Violation and barrier function of some values.
+    fn measure(&self, values: &Values) -> Measure {
+        Measure {
+            violation: violation(&self.layout, values),
+            merit: self.iterate.barrier.merit(values),
+        }
+    }
+}
+
+/// 1-norm of the equalities' violation.
+fn violation(layout: &Layout, values: &Values) -> f64 {
+    let of_block = |rows: std::ops::Range<usize>| {
+        let rows = values.equalities.get(rows).unwrap_or_default();
+        rows.iter().fold(0.0, |sum, value| sum + value.abs())
+    };
+    layout.equality_blocks().map(of_block).sum()
+}

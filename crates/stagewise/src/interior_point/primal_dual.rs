@@ -1,0 +1,200 @@
+//! A point with its multipliers under a barrier, and the Newton step from it.
+
+use super::Residuals;
+use super::barrier::{Barrier, Lengths};
+use crate::linear::chain::NodeVector;
+use crate::linear::{Inertia, Kkt};
+use crate::program::{Multipliers, Program, Scales, Values};
+use crate::{largest, largest_entry};
+
+/// A point and its multipliers, the derivatives there, the step from there, and where that leads.
+pub(crate) struct PrimalDual<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> {
+    pub(crate) program: P,
+    pub(crate) point: P::Point,
+    pub(crate) values: Values,
+    pub(crate) multipliers: Multipliers,
+    pub(crate) barrier: Barrier,
+    pub(crate) kkt: Kkt<X, U, N>,
+    /// Gradient of the barrier problem's Lagrangian, where the step was found.
+    pub(crate) gradient: Vec<NodeVector<N>>,
+    pub(crate) trial_values: Values,
+    trial: P::Point,
+    /// Step of the inequalities' multipliers.
+    inequality_step: Vec<f64>,
+    rates: Vec<f64>,
+    scales: Scales,
+}
+
+impl<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> PrimalDual<P, X, U, N> {
+    /// At a point, with the inequalities' multipliers on the central path; and whether the point is admissible.
+    pub(crate) fn new(program: P, barrier: f64, mut point: P::Point) -> (Self, bool) {
+        let kkt = Kkt::new(program.layout());
+        let mut values = Values::default();
+        let admissible = program.evaluate(&mut point, &mut values);
+        let layout = kkt.layout();
+        let rows = layout.inequalities();
+        let mut iterate = Self {
+            scales: program.scales(),
+            program,
+            trial: point.clone(),
+            trial_values: values.clone(),
+            point,
+            values,
+            multipliers: Multipliers::zero(layout),
+            barrier: Barrier::new(barrier, layout),
+            gradient: kkt.linear.gradient.clone(),
+            inequality_step: vec![0.0; rows],
+            rates: vec![0.0; rows],
+            kkt,
+        };
+        iterate.centre();
+        iterate.linearise();
+        (iterate, admissible)
+    }
+
+    /// Puts the inequalities' multipliers on the central path.
+    pub(crate) fn centre(&mut self) {
+        let multipliers = self.multipliers.inequalities.iter_mut();
+        for (row, (multiplier, slack)) in multipliers.zip(&self.values.slacks).enumerate() {
+            *multiplier = self.barrier.target(row) / slack;
+        }
+    }
+
+    /// Finds the derivatives at the point.
+    pub(crate) fn linearise(&mut self) {
+        self.kkt
+            .linearise(&self.program, &self.point, &self.multipliers);
+    }
+
+    /// Assembles the system from the derivatives.
+    pub(crate) fn assemble(&mut self) {
+        self.kkt
+            .assemble(&self.values, &self.multipliers.inequalities);
+    }
+
+    /// Residuals of the first-order conditions without a barrier.
+    pub(crate) fn residuals(&mut self) -> Residuals {
+        self.gradient.copy_from_slice(&self.kkt.linear.gradient);
+        Residuals {
+            stationarity: self.stationarity(),
+            constraint: largest(self.values.equalities.iter()),
+            complementarity: self.complementarity(0.0),
+        }
+    }
+
+    /// The stationarity that would be left if the equalities' multipliers were zero.
+    pub(crate) fn stationarity_without_equalities(&mut self) -> f64 {
+        self.gradient.copy_from_slice(&self.kkt.linear.gradient);
+        self.kkt
+            .take_off_pulls(&self.multipliers.equalities, &mut self.gradient);
+        self.stationarity()
+    }
+
+    /// Largest entry of the gradient once the inequalities' multipliers are taken off.
+    fn stationarity(&mut self) -> f64 {
+        let multipliers = &self.multipliers.inequalities;
+        let linear = &self.kkt.linear;
+        linear.add_slack_gradients(|row| -multipliers[row], &mut self.gradient);
+        linear.chain.fold(&mut self.gradient);
+        largest_entry(&self.gradient)
+    }
+
+    fn complementarity(&self, parameter: f64) -> f64 {
+        let multipliers = &self.multipliers.inequalities;
+        self.barrier
+            .complementarity(parameter, &self.values.slacks, multipliers)
+    }
+
+    /// Lowers the barrier while its problem is solved well enough, and says whether it did; `residuals` are those without a
+    /// barrier.
+    pub(crate) fn lower_barrier(&mut self, residuals: &Residuals, tolerance: f64) -> bool {
+        const SOLVED: f64 = 10.0;
+        let heaviest = self.barrier.heaviest();
+        let least = 0.1 * tolerance / heaviest;
+        let mut lowered = false;
+        loop {
+            let parameter = self.barrier.parameter;
+            let left = Residuals {
+                complementarity: self.complementarity(parameter),
+                ..*residuals
+            };
+            if parameter <= least || left.largest() > SOLVED * parameter * heaviest {
+                return lowered;
+            }
+            self.barrier.lower(least);
+            lowered = true;
+        }
+    }
+
+    /// Inertia of the second variation; the derivatives are not to be relied on afterwards.
+    pub(crate) fn inertia(&mut self) -> Option<Inertia> {
+        let metric = self.program.metric(&self.point);
+        let multipliers = &self.multipliers.inequalities;
+        self.kkt
+            .inertia(&self.values, multipliers, &metric, &self.scales)
+    }
+
+    /// Newton step of the barrier problem.
+    pub(crate) fn find_step(&mut self) {
+        self.find_barrier_gradient();
+        self.kkt.find_step(&self.gradient, &self.values.equalities);
+    }
+
+    /// Gradient of the barrier problem's Lagrangian.
+    pub(crate) fn find_barrier_gradient(&mut self) {
+        self.gradient.copy_from_slice(&self.kkt.linear.gradient);
+        let (barrier, slacks) = (&self.barrier, &self.values.slacks);
+        let force = |row: usize| -barrier.target(row) / slacks[row];
+        self.kkt
+            .linear
+            .add_slack_gradients(force, &mut self.gradient);
+    }
+
+    /// Step of the inequalities' multipliers, and the lengths that keep slacks and multipliers positive.
+    pub(crate) fn find_inequality_step(&mut self) -> Lengths {
+        self.kkt.slack_rates(&mut self.rates);
+        self.barrier.find_step(
+            &self.values.slacks,
+            &self.multipliers.inequalities,
+            &self.rates,
+            &self.kkt.stiffness,
+            &mut self.inequality_step,
+        )
+    }
+
+    /// Evaluates the trial point along the step; false outside the domain.
+    pub(crate) fn try_step(&mut self, length: f64) -> bool {
+        self.program
+            .retract(&self.point, &self.kkt.step, length, &mut self.trial);
+        self.program
+            .evaluate(&mut self.trial, &mut self.trial_values)
+    }
+
+    /// The same along the step of another system.
+    pub(crate) fn try_along(&mut self, step: &[NodeVector<N>], length: f64) -> bool {
+        self.program
+            .retract(&self.point, step, length, &mut self.trial);
+        self.program
+            .evaluate(&mut self.trial, &mut self.trial_values)
+    }
+
+    /// Takes the trial point and moves the multipliers along.
+    pub(crate) fn accept(&mut self, lengths: Lengths) {
+        self.take_trial();
+        let steps = self.kkt.multiplier_step.iter();
+        for (multiplier, step) in self.multipliers.equalities.iter_mut().zip(steps) {
+            *multiplier += lengths.primal * step;
+        }
+        self.barrier.advance(
+            &self.values.slacks,
+            lengths.dual,
+            &self.inequality_step,
+            &mut self.multipliers.inequalities,
+        );
+    }
+
+    pub(crate) fn take_trial(&mut self) {
+        std::mem::swap(&mut self.point, &mut self.trial);
+        std::mem::swap(&mut self.values, &mut self.trial_values);
+    }
+}

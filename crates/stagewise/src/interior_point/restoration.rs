@@ -1,0 +1,79 @@
+//! Feasibility restoration: a problem of its own, that of the shortest step toward the equalities under the barrier.
+
+use super::primal_dual::PrimalDual;
+use super::violation;
+use crate::layout::Layout;
+use crate::linear::Kkt;
+use crate::linear::chain::NodeVector;
+use crate::program::Program;
+
+/// The system of the restoration.
+pub(super) struct Restoration<const X: usize, const U: usize, const N: usize> {
+    kkt: Kkt<X, U, N>,
+    gradient: Vec<NodeVector<N>>,
+    rates: Vec<f64>,
+}
+
+impl<const X: usize, const U: usize, const N: usize> Restoration<X, U, N> {
+    pub(super) fn new(layout: &Layout) -> Self {
+        Self {
+            kkt: Kkt::new(layout.clone()),
+            gradient: vec![NodeVector::zeros(); layout.nodes()],
+            rates: vec![0.0; layout.inequalities()],
+        }
+    }
+
+    /// Moves a point by one step of least length toward the equalities, shortened until their violation falls; false where
+    /// it does not.
+    pub(super) fn step<P: Program<X, U, N>>(
+        &mut self,
+        iterate: &mut PrimalDual<P, X, U, N>,
+    ) -> bool {
+        const SHORTEST: f64 = 1e-8;
+        const SUFFICIENT: f64 = 1e-4;
+        self.kkt
+            .linearise(&iterate.program, &iterate.point, &iterate.multipliers);
+        self.kkt.linear.forget_second_derivatives();
+        self.kkt
+            .assemble(&iterate.values, &iterate.multipliers.inequalities);
+        let damping = iterate.barrier.parameter.sqrt();
+        if self.kkt.factorise_damped(damping).is_err() {
+            return false;
+        }
+        self.gradient.fill(NodeVector::zeros());
+        let (barrier, slacks) = (&iterate.barrier, &iterate.values.slacks);
+        let force = |row: usize| -barrier.target(row) / slacks[row];
+        self.kkt
+            .linear
+            .add_slack_gradients(force, &mut self.gradient);
+        self.kkt
+            .find_step(&self.gradient, &iterate.values.equalities);
+        let before = violation(self.kkt.layout(), &iterate.values);
+        let mut length = self.longest(iterate);
+        while length > SHORTEST {
+            if iterate.try_along(&self.kkt.step, length)
+                && violation(self.kkt.layout(), &iterate.trial_values)
+                    <= (1.0 - SUFFICIENT * length) * before
+            {
+                iterate.take_trial();
+                return true;
+            }
+            length *= 0.5;
+        }
+        false
+    }
+
+    /// The longest step that keeps the slacks positive.
+    fn longest<P: Program<X, U, N>>(&mut self, iterate: &PrimalDual<P, X, U, N>) -> f64 {
+        self.kkt.slack_rates(&mut self.rates);
+        let mut steps = vec![0.0; self.rates.len()];
+        let lengths = iterate.barrier.find_step(
+            &iterate.values.slacks,
+            &iterate.multipliers.inequalities,
+            &self.rates,
+            &self.kkt.stiffness,
+            &mut steps,
+        );
+        lengths.primal
+    }
+}

@@ -1,0 +1,50 @@
+//! Nonlinear programmes on a chain of stages: minimisation, stability, response, continuation.
+//!
+//! A programme is a chain of nodes joined by stages. Every node carries a state and controls; the state is carried along the
+//! chain by what the controls add to it. Equalities tie nodes, or pairs of nodes; inequalities bound the controls of a stage,
+//! a node, or a pair of nodes. Whoever implements [`Program`] says what all of these are; every iteration then costs time
+//! linear in the length of the chain.
+//!
+//! - [`minimise`] is a primal–dual interior-point method: A. Wächter and L. T. Biegler, "On the implementation of an
+//!   interior-point filter line-search algorithm for large-scale nonlinear programming" (2006).
+//! - [`Inertia`] and [`lowest_modes`] tell whether a stationary point is a minimum; [`Response`] how it answers to changes.
+//! - [`Follower`] follows a minimum while its programme changes, [`Continuation`] a curve of stationary points.
+//!
+//! Sizes are constants: `X` numbers of a state, `U` controls, `N = X + U` unknowns of a node.
+
+mod interior_point;
+mod layout;
+mod linear;
+mod path;
+mod program;
+
+pub use interior_point::{Outcome, Residuals, Settings, Solution, assess, minimise};
+pub use layout::{Block, Layout};
+pub use linear::chain::{
+    ByControls, Chain, Diagonal, Factor, NodeMatrix, NodeTerm, NodeVector, Stage, StageMatrix,
+};
+pub use linear::{
+    Direction, Inertia, Mode, Response, Singular, TooConcave, lowest_modes, moved,
+    redundant_equalities,
+};
+pub use path::{
+    Continuation, Curve, End, Event, Events, Family, FollowSettings, Followed, Follower, Pace,
+    Station, Turn, over_modal_load, settle,
+};
+pub use program::{Distance, Linearisation, Multipliers, Program, Scales, Stationary, Values};
+
+/// The larger of two numbers; NaN where one of them is, so that no residual hides one.
+fn larger(a: f64, b: f64) -> f64 {
+    if b <= a { a } else { b }
+}
+
+/// Largest absolute value; NaN where one is.
+fn largest<'a>(numbers: impl Iterator<Item = &'a f64>) -> f64 {
+    numbers.fold(0.0, |most, x| larger(most, x.abs()))
+}
+
+/// Largest absolute entry; NaN where one is.
+fn largest_entry<const N: usize>(vectors: &[NodeVector<N>]) -> f64 {
+    let amax = vectors.iter().map(NodeVector::amax);
+    amax.fold(0.0, larger)
+}

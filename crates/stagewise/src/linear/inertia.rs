@@ -1,0 +1,119 @@
+//! The second variation at a solution: in how many directions it is negative, and in how many it vanishes.
+//!
+//! Of the directions that the equalities and the active inequalities leave. It is counted, not sampled: the factorisation of
+//! a symmetric matrix has as many negative pivots as the matrix has negative eigenvalues.
+
+use super::chain::ByControls;
+use super::kkt::Kkt;
+use crate::program::{Linearisation, Scales, Values};
+use nalgebra::SMatrix;
+
+/// Eigenvalues below this, in the unit of [`Scales::eigenvalue`], are not told from zero.
+const ZERO: f64 = 1e-2;
+/// An inequality is active where its multiplier per weight is so many times its slack, and is inactive the other way round.
+const CLEAR: f64 = 100.0;
+
+/// Numbers of eigenvalues of the second variation by their sign.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Inertia {
+    /// Negative ones.
+    pub negative: usize,
+    /// Those that are not told from zero.
+    pub zero: usize,
+    /// Controls that neither move nor cost anything, and are in neither number.
+    pub cost_free: usize,
+}
+
+impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
+    /// Inertia of the second variation; `None` where it depends on inequalities that are neither clearly active nor clearly
+    /// inactive. The derivatives are not to be relied on afterwards.
+    pub(crate) fn inertia(
+        &mut self,
+        values: &Values,
+        multipliers: &[f64],
+        metric: &[SMatrix<f64, X, X>],
+        scales: &Scales,
+    ) -> Option<Inertia> {
+        let cost_free = self.linear.hold_cost_free_controls();
+        let zero = ZERO * scales.eigenvalue();
+        let clear = |slack: f64, multiplier: f64| multiplier > CLEAR * slack;
+        let doubtful = |slack: f64, multiplier: f64| CLEAR * multiplier > slack;
+        let mut below = |shift: f64, active: fn(f64, f64) -> bool| {
+            self.assemble_where(values, multipliers, active);
+            self.shift(metric, shift);
+            self.count_negative().ok()
+        };
+        let not_positive = below(zero, clear)?;
+        let negative = match not_positive {
+            0 => 0,
+            _ => below(-zero, clear)?,
+        };
+        let is_in_doubt = not_positive > 0 && below(-zero, doubtful)? != negative;
+        (!is_in_doubt).then_some(Inertia {
+            negative,
+            zero: not_positive - negative,
+            cost_free,
+        })
+    }
+}
+
+impl<const X: usize, const U: usize, const N: usize> Linearisation<X, U, N> {
+    /// Holds the controls that neither move anything nor cost anything to second order, and counts them.
+    pub(super) fn hold_cost_free_controls(&mut self) -> usize {
+        let mut cost_free = self.cost_free_controls();
+        for (k, stage) in self.chain.stages.iter().enumerate().rev() {
+            let next = cost_free[k + 1];
+            for (i, cost_free) in cost_free[k].iter_mut().enumerate() {
+                *cost_free &= stage.tie[i] == 0.0 || next[i];
+            }
+        }
+        let mut held = 0;
+        let stages = self.chain.stages.iter_mut().map(|stage| &mut stage.free);
+        let free = std::iter::once(&mut self.chain.first_free).chain(stages);
+        for (free, cost_free) in free.zip(cost_free) {
+            for i in 0..U {
+                held += usize::from(free[i] && cost_free[i]);
+                free[i] &= !cost_free[i];
+            }
+        }
+        held
+    }
+
+    /// Of every node, which controls have derivatives far below the largest of any stage.
+    fn cost_free_controls(&self) -> Vec<[bool; U]> {
+        const NOTHING: f64 = 1e-8;
+        let stages = self.chain.stages.iter().zip(&self.diagonal.controls);
+        let mut most = vec![[0.0; U]; self.chain.stages.len() + 1];
+        let mut largest: f64 = 0.0;
+        for (k, (stage, controls)) in stages.enumerate() {
+            let column = |of: &ByControls<U, N>, i: usize| of.column(i).amax();
+            let first = |i: usize| {
+                column(&stage.growth_by_first, i)
+                    .max(column(&stage.state_first, i))
+                    .max(controls.first.column(i).amax())
+                    .max(controls.mixed.row(i).amax())
+            };
+            let second = |i: usize| {
+                column(&stage.growth_by_second, i)
+                    .max(column(&stage.state_second, i))
+                    .max(controls.second.column(i).amax())
+                    .max(controls.mixed.column(i).amax())
+            };
+            let ends: [&dyn Fn(usize) -> f64; 2] = [&first, &second];
+            for (end, largest_of) in ends.into_iter().enumerate() {
+                for (i, most) in most[k + end].iter_mut().enumerate() {
+                    let all = largest_of(i);
+                    *most = f64::max(*most, all);
+                    largest = largest.max(all);
+                }
+            }
+        }
+        for term in &self.diagonal.nodes {
+            for (i, most) in most[term.node].iter_mut().enumerate() {
+                *most = f64::max(*most, term.hessian.column(X + i).amax());
+            }
+        }
+        let is_cost_free = |most: f64| most <= NOTHING * largest;
+        most.iter().map(|most| most.map(is_cost_free)).collect()
+    }
+}

@@ -1,0 +1,422 @@
+//! The first-order conditions of a barrier problem, linearised: inequalities eliminated, inertia controlled, equalities met
+//! exactly.
+//!
+//! ```text
+//! [ H  Jᵀ  Sᵀ  ] [ step ]       [ gradient   ]
+//! [ J          ] [  λ   ]  =  − [ equalities ]
+//! [ S     −s/ν ] [  κ   ]       [     0      ]
+//! ```
+//!
+//! H is the second derivative of the Lagrangian, J and S the gradients of equalities and slacks, s the slacks and ν their
+//! multipliers. Inequalities of stages and nodes are folded into H; inequalities between pairs are rows of the border.
+
+use super::TooConcave;
+use super::border::{Border, Row};
+use super::chain::{Diagonal, Factor, NodeMatrix, NodeVector};
+use crate::larger;
+use crate::layout::Layout;
+use crate::program::{Linearisation, Multipliers, Program, Values, product};
+use nalgebra::SMatrix;
+use std::ops::Range;
+
+/// Compliance lent to the equalities so that the chain can be factorised without them; refinement takes it back.
+const COMPLIANCE: f64 = 1e-7;
+/// Most times that equalities are met again by what the step still misses of them.
+const REFINEMENTS: usize = 2;
+/// Miss of the equalities along a step that is rounding.
+const EXACT: f64 = 1e-12;
+
+/// A factorised system and its solution, with the room that both take.
+#[derive(Debug, Clone)]
+pub(crate) struct Kkt<const X: usize, const U: usize, const N: usize> {
+    /// Derivatives of the programme.
+    pub(crate) linear: Linearisation<X, U, N>,
+    /// Stiffness of every inequality: multiplier over slack as they were assembled; zero of those left out.
+    pub(crate) stiffness: Vec<f64>,
+    diagonal: Diagonal<X, U, N>,
+    factor: Factor<U, N>,
+    /// Equalities between pairs, then inequalities between pairs.
+    border: Border<N>,
+    /// All equalities as rows of a border, then the inequalities between pairs, where they are so.
+    exact: Option<Border<N>>,
+    node_weights: Vec<f64>,
+    damping: f64,
+    right: Vec<NodeVector<N>>,
+    correction: Vec<NodeVector<N>>,
+    /// Forces that the inequalities between pairs take along the step.
+    pair_forces: Vec<f64>,
+    rates: Vec<f64>,
+    /// Step of the unknowns.
+    pub(crate) step: Vec<NodeVector<N>>,
+    /// Step of the equalities' multipliers.
+    pub(crate) multiplier_step: Vec<f64>,
+}
+
+impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
+    pub(crate) fn new(layout: Layout) -> Self {
+        let zeros = vec![NodeVector::zeros(); layout.nodes()];
+        let linear = Linearisation::new(layout);
+        let layout = linear.layout();
+        let equalities = layout.equalities_between().iter();
+        let inequalities = layout.inequalities_between().iter();
+        let pairs = equalities.chain(inequalities);
+        let rows = pairs
+            .flat_map(|block| vec![Row::between(block.at, [NodeVector::zeros(); 2]); block.rows]);
+        Self {
+            border: Border::new(rows.collect(), layout.nodes()),
+            exact: None,
+            stiffness: vec![0.0; layout.inequalities()],
+            diagonal: linear.diagonal.clone(),
+            factor: Factor::new(layout.stages()),
+            node_weights: layout.node_weights(),
+            damping: 0.0,
+            right: zeros.clone(),
+            correction: zeros.clone(),
+            pair_forces: vec![0.0; linear.pair_slacks.len()],
+            rates: vec![0.0; layout.equalities()],
+            multiplier_step: vec![0.0; layout.equalities()],
+            step: zeros,
+            linear,
+        }
+    }
+
+    /// Sizes of the programme.
+    pub(crate) fn layout(&self) -> &Layout {
+        self.linear.layout()
+    }
+
+    /// Takes over the derivatives of a programme at a point.
+    pub(crate) fn linearise<P: Program<X, U, N>>(
+        &mut self,
+        program: &P,
+        point: &P::Point,
+        multipliers: &Multipliers,
+    ) {
+        program.linearise(point, multipliers, &mut self.linear);
+    }
+
+    /// Assembles the second derivatives, with the inequalities eliminated and the equalities as stiff springs.
+    pub(crate) fn assemble(&mut self, values: &Values, multipliers: &[f64]) {
+        self.assemble_where(values, multipliers, |_, _| true);
+    }
+
+    /// The same with the inequalities left out of which `counts(slack, multiplier per weight)` is false.
+    pub(crate) fn assemble_where(
+        &mut self,
+        values: &Values,
+        multipliers: &[f64],
+        counts: impl Fn(f64, f64) -> bool,
+    ) {
+        let weights = self.linear.layout().row_weights();
+        for (row, stiffness) in self.stiffness.iter_mut().enumerate() {
+            let (slack, multiplier) = (values.slacks[row], multipliers[row]);
+            let counted = counts(slack, multiplier / weights[row]);
+            *stiffness = if counted { multiplier / slack } else { 0.0 };
+        }
+        let layout = self.linear.layout();
+        self.diagonal
+            .controls
+            .copy_from_slice(&self.linear.diagonal.controls);
+        for (k, controls) in self.diagonal.controls.iter_mut().enumerate() {
+            for row in layout.stage_rows(k) {
+                controls.add_square(self.stiffness[row], &self.linear.stage_slacks[row]);
+            }
+        }
+        self.diagonal
+            .states
+            .clone_from(&self.linear.diagonal.states);
+        self.assemble_nodes();
+        self.assemble_border();
+    }
+
+    /// Second derivatives at single nodes: of the programme, of the springs, of the nodes' inequalities.
+    fn assemble_nodes(&mut self) {
+        let linear = &self.linear;
+        let layout = linear.layout();
+        self.diagonal.nodes.copy_from_slice(&linear.diagonal.nodes);
+        let mut rows = linear.equalities_at.iter();
+        for (i, block) in layout.equalities_at().iter().enumerate() {
+            let mut springs = NodeMatrix::zeros();
+            for row in rows.by_ref().take(block.rows) {
+                springs += row * row.transpose();
+            }
+            self.diagonal.nodes[linear.term(i)].hessian += springs / COMPLIANCE;
+        }
+        let stiffness = &self.stiffness[layout.inequalities_at_stages()..];
+        let mut rows = linear.node_slacks.iter().zip(stiffness);
+        for (i, block) in layout.inequalities_at().iter().enumerate() {
+            let term = linear.term(layout.equalities_at().len() + i);
+            for (row, stiffness) in rows.by_ref().take(block.rows) {
+                self.diagonal.nodes[term].hessian += *stiffness * row * row.transpose();
+            }
+        }
+    }
+
+    fn assemble_border(&mut self) {
+        let linear = &self.linear;
+        let (equalities, inequalities) = self
+            .border
+            .rows
+            .split_at_mut(linear.equalities_between.len());
+        for (row, by) in equalities.iter_mut().zip(&linear.equalities_between) {
+            row.by = *by;
+        }
+        let first = linear.layout().inequalities() - linear.pair_slacks.len();
+        let slacks = linear.pair_slacks.iter().zip(&self.stiffness[first..]);
+        for (row, (by, stiffness)) in inequalities.iter_mut().zip(slacks) {
+            // A row that is left out takes no part: it is zero.
+            let counted = *stiffness != 0.0;
+            row.by = if counted {
+                *by
+            } else {
+                [NodeVector::zeros(); 2]
+            };
+            row.compliance = if counted { stiffness.recip() } else { 0.0 };
+        }
+    }
+
+    /// Factorises with just enough damping to be convex on the tangent space of the equalities.
+    ///
+    /// Errors: [`TooConcave`] where no damping is enough.
+    pub(crate) fn factorise(&mut self) -> Result<(), TooConcave> {
+        const FIRST: f64 = 1e-4;
+        const MOST: f64 = 1e12;
+        if self.factorise_damped(0.0).is_ok() {
+            return Ok(());
+        }
+        let known = self.damping > 0.0;
+        let mut damping = if known { self.damping / 3.0 } else { FIRST };
+        while damping < MOST {
+            if self.factorise_damped(damping).is_ok() {
+                self.damping = damping;
+                return Ok(());
+            }
+            damping *= if known { 8.0 } else { 100.0 };
+        }
+        Err(TooConcave)
+    }
+
+    /// Factorises with a given damping of the controls per unit weight.
+    ///
+    /// Errors: [`TooConcave`] where it is concave in any direction that the equalities leave.
+    pub(crate) fn factorise_damped(&mut self, damping: f64) -> Result<(), TooConcave> {
+        self.exact = None;
+        let (chain, factor) = (&self.linear.chain, &mut self.factor);
+        let most = self.border.rows.len();
+        let concave = chain.factorise(&self.diagonal, damping, &self.node_weights, most, factor)?;
+        let held = self.border.factorise(chain, factor, COMPLIANCE)?;
+        match concave == held {
+            true => Ok(()),
+            false => Err(TooConcave),
+        }
+    }
+
+    /// Factorises, however concave; gives the number of negative directions among those that the equalities leave.
+    ///
+    /// The springs that stand for the equalities could not be made rigid by refinement where the second derivative all but
+    /// vanishes in some direction. So the equalities are rows of the border here.
+    ///
+    /// Errors: [`TooConcave`] where the chain has a direction of no curvature.
+    pub(crate) fn factorise_exactly(&mut self) -> Result<usize, TooConcave> {
+        let concave = self.factorise_chain()?;
+        let mut border = self.all_rows();
+        let held = border.factorise(&self.linear.chain, &mut self.factor, 0.0)?;
+        self.exact = Some(border);
+        Ok(concave.saturating_sub(held))
+    }
+
+    /// The number of directions, of those that the equalities leave, in which the second derivative as assembled is negative.
+    ///
+    /// With the equalities as springs the count can only be too large: the directions that they hold, as they are rigid, are
+    /// taken off.
+    ///
+    /// Errors: [`TooConcave`] where there is a direction of no curvature.
+    pub(crate) fn count_negative(&mut self) -> Result<usize, TooConcave> {
+        let concave = self.factorise_chain()?;
+        if concave == 0 {
+            return Ok(0);
+        }
+        let mut border = self.all_rows();
+        let held = border.factorise(&self.linear.chain, &mut self.factor, 0.0)?;
+        Ok(concave.saturating_sub(held))
+    }
+
+    fn factorise_chain(&mut self) -> Result<usize, TooConcave> {
+        let (chain, factor) = (&self.linear.chain, &mut self.factor);
+        chain.factorise(&self.diagonal, 0.0, &self.node_weights, usize::MAX, factor)
+    }
+
+    /// A border of all equalities and of the inequalities between pairs.
+    fn all_rows(&self) -> Border<N> {
+        let mut by = self.linear.equalities_at.iter();
+        let blocks = self.layout().equalities_at().iter();
+        let mut rows = Vec::with_capacity(by.len() + self.border.rows.len());
+        for block in blocks {
+            rows.extend(
+                by.by_ref()
+                    .take(block.rows)
+                    .map(|by| Row::at(block.at, *by)),
+            );
+        }
+        rows.extend(&self.border.rows);
+        Border::new(rows, self.layout().nodes())
+    }
+
+    /// The change of every equality under a unit multiplier of every other, where the unknowns cost their squares alone;
+    /// `None` where that cannot be factorised.
+    pub(crate) fn compliance_of_equalities(&mut self) -> Option<nalgebra::DMatrix<f64>> {
+        let stages = self.layout().stages();
+        let weights = vec![1.0 / stages as f64; stages + 1];
+        let (linear, factor) = (&self.linear, &mut self.factor);
+        let factorised = linear
+            .chain
+            .factorise(&linear.diagonal, 1.0, &weights, 0, factor);
+        factorised.ok()?;
+        self.assemble_border();
+        let mut border = self.all_rows();
+        border.rows.truncate(self.layout().equalities());
+        Some(border.compliance(&self.linear.chain, &mut self.factor, 0.0))
+    }
+
+    /// Takes a multiple of a metric off the second derivatives as assembled.
+    pub(crate) fn shift(&mut self, metric: &[SMatrix<f64, X, X>], by: f64) {
+        self.diagonal.shift(metric, by);
+    }
+
+    /// Finds the step of least cost along which the equalities change by `−targets`, and the step of their multipliers.
+    ///
+    /// The springs that stand for the equalities give way a little; pulling again by what is still missing (the method of
+    /// multipliers on the quadratic programme) makes them rigid.
+    pub(crate) fn find_step(&mut self, gradient: &[NodeVector<N>], targets: &[f64]) {
+        if let Some(border) = self.exact.take() {
+            self.find_step_exactly(&border, gradient, targets);
+            self.exact = Some(border);
+            return;
+        }
+        let at_nodes = self.layout().equalities_at_nodes();
+        let (targets_at, targets_between) = targets.split_at(at_nodes);
+        self.right.copy_from_slice(gradient);
+        self.step.fill(NodeVector::zeros());
+        self.multiplier_step.fill(0.0);
+        self.pair_forces.fill(0.0);
+        for _ in 0..=REFINEMENTS {
+            self.pull_at_nodes(targets_at);
+            self.linear
+                .chain
+                .solve(&mut self.factor, &self.right, &mut self.correction);
+            self.correct_pairs(targets_between);
+            for (step, correction) in self.step.iter_mut().zip(&self.correction) {
+                *step += correction;
+            }
+            let most = self.take_missing_at_nodes(targets_at);
+            if most <= EXACT && self.border.rows.is_empty() {
+                break;
+            }
+            self.right.fill(NodeVector::zeros());
+        }
+    }
+
+    /// Adds the springs' pull by what the step misses of the targets at nodes to the right-hand side.
+    fn pull_at_nodes(&mut self, targets: &[f64]) {
+        let mut rows = self.linear.equalities_at.iter().zip(targets);
+        for block in self.linear.layout().equalities_at() {
+            let mut pull = NodeVector::zeros();
+            for (row, target) in rows.by_ref().take(block.rows) {
+                pull += (product(row, &self.step[block.at]) + target) * row;
+            }
+            self.right[block.at] += pull / COMPLIANCE;
+        }
+    }
+
+    /// Adds what the step misses of the targets at nodes, as forces of the springs, to the multipliers' step; gives the
+    /// largest miss.
+    fn take_missing_at_nodes(&mut self, targets: &[f64]) -> f64 {
+        let mut most: f64 = 0.0;
+        let mut rows = self.linear.equalities_at.iter().zip(targets);
+        let mut steps = self.multiplier_step.iter_mut();
+        for block in self.linear.layout().equalities_at() {
+            for ((row, target), step) in rows.by_ref().zip(steps.by_ref()).take(block.rows) {
+                let missing = product(row, &self.step[block.at]) + target;
+                *step += missing / COMPLIANCE;
+                most = larger(most, missing.abs());
+            }
+        }
+        most
+    }
+
+    /// Bends the correction to the rows between pairs.
+    fn correct_pairs(&mut self, targets: &[f64]) {
+        if self.border.rows.is_empty() {
+            return;
+        }
+        let mut missing: Vec<f64> = self.border.changes(&self.step).collect();
+        let (equalities, inequalities) = missing.split_at_mut(targets.len());
+        for (missing, target) in equalities.iter_mut().zip(targets) {
+            *missing += target;
+        }
+        let rows = &self.border.rows[targets.len()..];
+        for ((missing, row), force) in inequalities.iter_mut().zip(rows).zip(&self.pair_forces) {
+            *missing -= row.compliance * force;
+        }
+        let forces = self.border.correct(&missing, &mut self.correction);
+        let (equalities, inequalities) = forces.as_slice().split_at(targets.len());
+        let at_nodes = self.linear.layout().equalities_at_nodes();
+        for (step, force) in self.multiplier_step[at_nodes..].iter_mut().zip(equalities) {
+            *step += force;
+        }
+        for (own, force) in self.pair_forces.iter_mut().zip(inequalities) {
+            *own += force;
+        }
+    }
+
+    /// The same where all equalities are rows of a border.
+    fn find_step_exactly(
+        &mut self,
+        border: &Border<N>,
+        gradient: &[NodeVector<N>],
+        targets: &[f64],
+    ) {
+        let targets_at = &targets[..self.layout().equalities_at_nodes()];
+        self.right.copy_from_slice(gradient);
+        self.step.fill(NodeVector::zeros());
+        self.pull_at_nodes(targets_at);
+        self.linear
+            .chain
+            .solve(&mut self.factor, &self.right, &mut self.step);
+        let all: Vec<f64> = targets
+            .iter()
+            .copied()
+            .chain(self.pair_forces.iter().map(|_| 0.0))
+            .collect();
+        let forces = border.correct(&all, &mut self.step);
+        self.multiplier_step
+            .copy_from_slice(&forces.as_slice()[..targets.len()]);
+        self.take_missing_at_nodes(targets_at);
+    }
+
+    /// Takes the pull of the equalities' multipliers off a gradient by the unknowns.
+    pub(crate) fn take_off_pulls(&mut self, multipliers: &[f64], gradient: &mut [NodeVector<N>]) {
+        self.right.fill(NodeVector::zeros());
+        self.linear
+            .add_equality_gradients(multipliers, &mut self.right);
+        self.linear.chain.carry_back(&mut self.right);
+        for (gradient, pull) in gradient.iter_mut().zip(&self.right) {
+            *gradient -= pull;
+        }
+    }
+
+    /// Change of every slack along the step, to first order.
+    pub(crate) fn slack_rates(&self, into: &mut [f64]) {
+        self.linear.slack_rates(&self.step, into);
+    }
+
+    /// Change of the multipliers' work on the equalities along the step, to first order.
+    pub(crate) fn equality_work(&mut self, multipliers: &[f64]) -> f64 {
+        self.linear.equality_rates(&self.step, &mut self.rates);
+        let of_block = |rows: Range<usize>| {
+            let rows = self.rates[rows.clone()].iter().zip(&multipliers[rows]);
+            rows.fold(0.0, |sum, (rate, multiplier)| sum + multiplier * rate)
+        };
+        self.linear.layout().equality_blocks().map(of_block).sum()
+    }
+}

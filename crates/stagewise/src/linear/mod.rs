@@ -1,0 +1,22 @@
+//! Linear algebra on the chain: recursion along it, a border for what ties pairs of nodes, and what is counted and solved
+//! with both.
+
+mod border;
+pub(crate) mod chain;
+mod inertia;
+mod kkt;
+pub(crate) mod modes;
+mod rank;
+mod response;
+mod small;
+
+pub use inertia::Inertia;
+pub(crate) use kkt::Kkt;
+pub(crate) use modes::lowest_modes_of;
+pub use modes::{Mode, lowest_modes, moved};
+pub use rank::redundant_equalities;
+pub use response::{Direction, Response, Singular};
+
+/// The objective has more directions of negative curvature than allowed, or one of none.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TooConcave;

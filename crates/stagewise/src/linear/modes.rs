@@ -1,0 +1,205 @@
+//! Eigenvectors of the second variation, the lowest ones.
+
+use super::chain::NodeVector;
+use super::response::{Response, Singular};
+use crate::program::{Program, Scales, Stationary};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+
+/// A direction that the constraints leave, in which the second variation is a multiple of the metric.
+#[derive(Debug, Clone)]
+pub struct Mode<const N: usize> {
+    /// The multiple.
+    pub eigenvalue: f64,
+    /// Motion of every node, of norm 1 in the metric.
+    pub motion: Vec<NodeVector<N>>,
+    /// The metric's force on it.
+    pub force: Vec<NodeVector<N>>,
+}
+
+/// The lowest modes at a solution, rising; fewer than `count` where there are no more.
+///
+/// Subspace iteration with the inverse, shifted below all eigenvalues, so that it converges to the lowest in their order.
+///
+/// Errors: [`Singular`] where that cannot be factorised.
+pub fn lowest_modes<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>(
+    program: &P,
+    at: &mut Stationary<P::Point>,
+    count: usize,
+) -> Result<Vec<Mode<N>>, Singular> {
+    let response = Response::of_stationary(program, at)?;
+    lowest_modes_of(response, &program.scales(), count)
+}
+
+/// The same of a system that has been factorised.
+pub(crate) fn lowest_modes_of<const X: usize, const U: usize, const N: usize>(
+    mut response: Response<X, U, N>,
+    scales: &Scales,
+    count: usize,
+) -> Result<Vec<Mode<N>>, Singular> {
+    const GUARDS: usize = 4;
+    const ITERATIONS: usize = 100;
+    const SETTLED: f64 = 1e-12;
+    let shift = shift_below_all(&mut response, scales)?;
+    let mut subspace = first_guess(&response, count + GUARDS);
+    let mut last = vec![f64::INFINITY; count];
+    for _ in 0..ITERATIONS {
+        let forces: Vec<_> = subspace.iter().map(|mode| mode.force.clone()).collect();
+        let motions = answers(&mut response, &forces)?;
+        subspace = ritz(&response, &motions, &forces, shift);
+        let now: Vec<f64> = subspace
+            .iter()
+            .take(count)
+            .map(|mode| mode.eigenvalue)
+            .collect();
+        let moved = |(now, last): (&f64, &f64)| (now - last).abs() > SETTLED * (now - shift).abs();
+        let is_settled = now.len() < last.len() || !now.iter().zip(&last).any(moved);
+        if is_settled && now.len() == last.len() {
+            break;
+        }
+        last = now;
+    }
+    subspace.truncate(count);
+    Ok(subspace)
+}
+
+/// A point moved so far along a mode.
+pub fn moved<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>(
+    program: &P,
+    point: &P::Point,
+    mode: &Mode<N>,
+    length: f64,
+) -> P::Point {
+    let mut moved = point.clone();
+    program.retract(point, &mode.motion, length, &mut moved);
+    moved
+}
+
+/// Shifts the system to where no eigenvalue is below, and says by how much.
+fn shift_below_all<const X: usize, const U: usize, const N: usize>(
+    response: &mut Response<X, U, N>,
+    scales: &Scales,
+) -> Result<f64, Singular> {
+    /// First shift, in the unit of eigenvalues.
+    const FIRST: f64 = -100.0;
+    const MOST: usize = 20;
+    let (mut shift, mut next) = (0.0, FIRST * scales.eigenvalue());
+    for _ in 0..MOST {
+        let negative = response.shift(next - shift);
+        shift = next;
+        if negative == Ok(0) {
+            return Ok(shift);
+        }
+        next = 8.0 * shift;
+    }
+    Err(Singular)
+}
+
+/// Smooth motions in general position.
+fn first_guess<const X: usize, const U: usize, const N: usize>(
+    response: &Response<X, U, N>,
+    count: usize,
+) -> Vec<Mode<N>> {
+    let zero = response.zero().nodes;
+    let nodes = zero.len() as f64;
+    let motion = |mode: usize| {
+        let at = |node: usize| {
+            let u = node as f64 / nodes;
+            NodeVector::<N>::from_fn(|i, _| match i < X {
+                true => ((mode as f64 + 1.0) * (3.0 * u + 0.7 * i as f64)).sin(),
+                false => 0.0,
+            })
+        };
+        (0..zero.len()).map(at).collect()
+    };
+    let guess = |mode| {
+        let motion: Vec<_> = motion(mode);
+        Mode {
+            eigenvalue: 0.0,
+            force: response.force(&motion),
+            motion,
+        }
+    };
+    (0..count).map(guess).collect()
+}
+
+/// A motion of every node, several times.
+type Motions<const N: usize> = Vec<Vec<NodeVector<N>>>;
+
+/// The motions under some forces.
+fn answers<const X: usize, const U: usize, const N: usize>(
+    response: &mut Response<X, U, N>,
+    forces: &[Vec<NodeVector<N>>],
+) -> Result<Motions<N>, Singular> {
+    let mut answer = |force: &Vec<NodeVector<N>>| {
+        let mut right = response.zero();
+        for (right, force) in right.nodes.iter_mut().zip(force) {
+            *right = -force;
+        }
+        Ok(response.solve(&right)?.nodes)
+    };
+    forces.iter().map(&mut answer).collect()
+}
+
+/// The best approximations of modes within the span of some motions, of which the forces are known under which they arise.
+fn ritz<const X: usize, const U: usize, const N: usize>(
+    response: &Response<X, U, N>,
+    motions: &[Vec<NodeVector<N>>],
+    forces: &[Vec<NodeVector<N>>],
+    shift: f64,
+) -> Vec<Mode<N>> {
+    const DEPENDENT: f64 = 1e-14;
+    let own: Vec<_> = motions
+        .iter()
+        .map(|motion| response.force(motion))
+        .collect();
+    let count = motions.len();
+    let products = |with: &[Vec<NodeVector<N>>]| {
+        let product = DMatrix::from_fn(count, count, |i, j| dot(&motions[i], &with[j]));
+        0.5 * (&product + product.transpose())
+    };
+    let (stiffness, mass) = (products(forces), products(&own));
+    // First to coordinates in which the mass is 1, without the motions that depend on others.
+    let scale = DVector::from_fn(count, |i, _| {
+        mass[(i, i)].max(f64::MIN_POSITIVE).sqrt().recip()
+    });
+    let scaled =
+        |m: &DMatrix<f64>| DMatrix::from_fn(count, count, |i, j| m[(i, j)] * scale[i] * scale[j]);
+    let eigen = SymmetricEigen::new(scaled(&mass));
+    let largest = eigen.eigenvalues.amax();
+    let kept: Vec<usize> = (0..count)
+        .filter(|i| eigen.eigenvalues[*i] > DEPENDENT * largest)
+        .collect();
+    let basis = DMatrix::from_fn(count, kept.len(), |i, j| {
+        eigen.eigenvectors[(i, kept[j])] / eigen.eigenvalues[kept[j]].sqrt() * scale[i]
+    });
+    let eigen = SymmetricEigen::new(basis.transpose() * stiffness * &basis);
+    let mut order: Vec<usize> = (0..kept.len()).collect();
+    order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
+    let coefficients = &basis * &eigen.eigenvectors;
+    let mode = |of: usize| {
+        let coefficients = coefficients.column(of);
+        Mode {
+            eigenvalue: eigen.eigenvalues[of] + shift,
+            motion: combine(motions, coefficients.iter().copied()),
+            force: combine(&own, coefficients.iter().copied()),
+        }
+    };
+    order.into_iter().map(mode).collect()
+}
+
+fn combine<const N: usize>(
+    motions: &[Vec<NodeVector<N>>],
+    factors: impl Iterator<Item = f64>,
+) -> Vec<NodeVector<N>> {
+    let mut sum = vec![NodeVector::zeros(); motions[0].len()];
+    for (motion, factor) in motions.iter().zip(factors) {
+        for (sum, node) in sum.iter_mut().zip(motion) {
+            *sum += factor * node;
+        }
+    }
+    sum
+}
+
+pub(crate) fn dot<const N: usize>(a: &[NodeVector<N>], b: &[NodeVector<N>]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
+}

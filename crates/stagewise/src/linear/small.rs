@@ -1,0 +1,184 @@
+//! Symmetric matrices of a few rows: inverse and inertia.
+
+use super::TooConcave;
+use nalgebra::{SMatrix, SVector};
+
+/// Inverse of a symmetric matrix with at most so many negative eigenvalues, and their number.
+///
+/// Errors: [`TooConcave`] where there are more, or the matrix is singular.
+#[inline(always)]
+pub(super) fn invert<const U: usize>(
+    matrix: &[[f64; U]; U],
+    most: usize,
+) -> Result<([[f64; U]; U], usize), TooConcave> {
+    match U {
+        // Most chains have two controls a node: nothing beats the closed form.
+        2 => {
+            let ([a, b, d], negative) =
+                invert_two([matrix[0][0], matrix[0][1], matrix[1][1]], most)?;
+            let mut inverse = [[0.0; U]; U];
+            (inverse[0][0], inverse[1][1]) = (a, d);
+            (inverse[0][1], inverse[1][0]) = (b, b);
+            Ok((inverse, negative))
+        }
+        _ => invert_any(matrix, most),
+    }
+}
+
+/// The same of a 2×2 matrix, by its entries (0, 0), (0, 1) and (1, 1).
+#[inline(always)]
+fn invert_two([a, b, d]: [f64; 3], most: usize) -> Result<([f64; 3], usize), TooConcave> {
+    let determinant = a * d - b * b;
+    let floor = f64::EPSILON * (a * d).abs().max(b * b);
+    let negative = if determinant < 0.0 {
+        1
+    } else if a < 0.0 {
+        2
+    } else {
+        0
+    };
+    // The comparison is false for a NaN.
+    let regular = determinant.abs() > floor;
+    if !regular || negative > most {
+        return Err(TooConcave);
+    }
+    let inverse = 1.0 / determinant;
+    Ok(([d * inverse, -b * inverse, a * inverse], negative))
+}
+
+fn invert_any<const U: usize>(
+    matrix: &[[f64; U]; U],
+    most: usize,
+) -> Result<([[f64; U]; U], usize), TooConcave> {
+    let matrix = SMatrix::<f64, U, U>::from_fn(|i, j| matrix[i][j]);
+    if let Some(cholesky) = matrix.cholesky() {
+        return Ok((cholesky.inverse().data.0, 0));
+    }
+    let (inverse, negative) = invert_indefinite(&matrix, most)?;
+    Ok((inverse.data.0, negative))
+}
+
+/// Inverse of a symmetric matrix by its eigenvectors, with at most so many negative eigenvalues, and their number.
+///
+/// Each unknown is measured in a unit of its own: that of a stiff one is not that of a slack one.
+///
+/// Errors: [`TooConcave`] where there are more, or the matrix is singular.
+pub(super) fn invert_indefinite<const N: usize>(
+    matrix: &SMatrix<f64, N, N>,
+    most: usize,
+) -> Result<(SMatrix<f64, N, N>, usize), TooConcave> {
+    if most == 0 {
+        return Err(TooConcave);
+    }
+    let scale = SVector::<f64, N>::from_fn(|i, _| matrix.row(i).amax().sqrt().recip());
+    let scaled = matrix.component_mul(&(scale * scale.transpose()));
+    let (values, vectors) = symmetric_eigen(&(0.5 * (scaled + scaled.transpose())));
+    let negative = values.iter().filter(|value| **value < 0.0).count();
+    let floor = f64::EPSILON * values.amax();
+    // The comparison is false for a NaN.
+    let regular = values.iter().all(|value| value.abs() > floor);
+    if negative > most || !regular {
+        return Err(TooConcave);
+    }
+    let mut inverse = SMatrix::<f64, N, N>::zeros();
+    for (value, vector) in values.iter().zip(vectors.column_iter()) {
+        inverse += vector * (vector.transpose() / *value);
+    }
+    Ok((
+        inverse.component_mul(&(scale * scale.transpose())),
+        negative,
+    ))
+}
+
+/// Eigenvalues and eigenvectors, as columns, of a symmetric matrix, by Jacobi's rotations.
+///
+/// Source: G. H. Golub and C. F. Van Loan, "Matrix Computations", 4th ed. (2013), Sec. 8.5
+fn symmetric_eigen<const N: usize>(
+    matrix: &SMatrix<f64, N, N>,
+) -> (SVector<f64, N>, SMatrix<f64, N, N>) {
+    const SWEEPS: usize = 60;
+    let mut a = *matrix;
+    let mut vectors = SMatrix::<f64, N, N>::identity();
+    for _ in 0..SWEEPS {
+        let mut is_diagonal = true;
+        for p in 0..N {
+            for q in p + 1..N {
+                let off = a[(p, q)];
+                if off.abs() <= f64::EPSILON * f64::EPSILON * (a[(p, p)] * a[(q, q)]).abs().sqrt()
+                    || off == 0.0
+                {
+                    continue;
+                }
+                is_diagonal = false;
+                let tau = (a[(q, q)] - a[(p, p)]) / (2.0 * off);
+                let tangent = tau.signum() / (tau.abs() + tau.hypot(1.0));
+                let cosine = tangent.hypot(1.0).recip();
+                let sine = tangent * cosine;
+                for k in 0..N {
+                    let (kp, kq) = (a[(k, p)], a[(k, q)]);
+                    a[(k, p)] = cosine * kp - sine * kq;
+                    a[(k, q)] = sine * kp + cosine * kq;
+                    let (kp, kq) = (vectors[(k, p)], vectors[(k, q)]);
+                    vectors[(k, p)] = cosine * kp - sine * kq;
+                    vectors[(k, q)] = sine * kp + cosine * kq;
+                }
+                for k in 0..N {
+                    let (pk, qk) = (a[(p, k)], a[(q, k)]);
+                    a[(p, k)] = cosine * pk - sine * qk;
+                    a[(q, k)] = sine * pk + cosine * qk;
+                }
+                (a[(p, q)], a[(q, p)]) = (0.0, 0.0);
+            }
+        }
+        if is_diagonal {
+            break;
+        }
+    }
+    (a.diagonal(), vectors)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn symmetric<const N: usize>(numbers: &[f64]) -> SMatrix<f64, N, N> {
+        let full = SMatrix::<f64, N, N>::from_iterator(numbers.iter().copied());
+        full + full.transpose()
+    }
+
+    fn assert_inverse<const N: usize>(numbers: &[f64]) -> Result<(), TestCaseError> {
+        let matrix = symmetric::<N>(numbers);
+        let rows = std::array::from_fn(|i| std::array::from_fn(|j| matrix[(i, j)]));
+        let (values, vectors) = symmetric_eigen(&matrix);
+        let again = vectors * SMatrix::from_diagonal(&values) * vectors.transpose();
+        prop_assert!((again - matrix).amax() < 1e-12);
+        prop_assume!(values.iter().all(|value| value.abs() > 1e-3));
+        let negative = values.iter().filter(|value| **value < 0.0).count();
+        let (inverse, count) = invert::<N>(&rows, N).unwrap();
+        let product = SMatrix::<f64, N, N>::from_fn(|i, j| inverse[i][j]) * matrix;
+        prop_assert!((product - SMatrix::identity()).amax() < 1e-9);
+        prop_assert_eq!(count, negative);
+        if negative > 0 {
+            prop_assert_eq!(invert::<N>(&rows, negative - 1), Err(TooConcave));
+        }
+        Ok(())
+    }
+
+    proptest! {
+        #[test]
+        fn test_inverse_and_inertia_of_any_size(numbers in prop::collection::vec(-1.0..1.0f64, 36)) {
+            assert_inverse::<1>(&numbers)?;
+            assert_inverse::<2>(&numbers)?;
+            assert_inverse::<3>(&numbers)?;
+            assert_inverse::<6>(&numbers)?;
+        }
+    }
+
+    #[test]
+    fn test_singular_matrices_have_no_inverse() {
+        assert_eq!(invert(&[[1.0, 1.0], [1.0, 1.0]], 2), Err(TooConcave));
+        assert_eq!(invert(&[[0.0]], 1), Err(TooConcave));
+        assert_eq!(invert(&[[f64::NAN, 0.0], [0.0, 1.0]], 2), Err(TooConcave));
+    }
+}

@@ -1,0 +1,289 @@
+//! Pseudo-arclength continuation: the curve of stationary points, minima or not, of a family of programmes.
+//!
+//! Every step goes along the tangent and is corrected by Newton's method square to it, so that the curve may turn back in the
+//! parameter. Where the inertia of the second variation changes, the place is found: a fold, where the parameter turns back,
+//! or a bifurcation, where another curve crosses.
+//!
+//! Source of the method: H. B. Keller, "Numerical solution of bifurcation and nonlinear eigenvalue problems" (1977).
+
+use super::curve::{Curve, End, Event, Events, Pace, Station, Turn};
+use super::family::{Alone, Family};
+use crate::interior_point::{Settings, Solution, assess, minimise};
+use crate::linear::modes::dot;
+use crate::linear::{Mode, Response, lowest_modes_of, moved};
+use crate::program::{Distance, Program, Stationary};
+use std::ops::ControlFlow;
+
+/// Follows the stationary points of a family.
+pub struct Continuation<'a, F, const X: usize, const U: usize, const N: usize> {
+    pub(super) family: &'a F,
+    pub(super) tolerance: f64,
+    /// Product of slack and multiplier that is allowed, in multiples of the tolerance.
+    pub(super) softness: f64,
+    pub(super) range: [f64; 2],
+    pub(super) pace: Pace,
+    /// Unit of distance.
+    pub(super) unit: f64,
+}
+
+/// Shortest step, in the unit of distance.
+const SHORTEST: f64 = 1e-7;
+
+/// A step of a continuation.
+pub(super) struct Step<P, const N: usize> {
+    pub(super) station: Station<P, N>,
+    pub(super) event: Option<Event<P, N>>,
+    pub(super) arrived: bool,
+}
+
+impl<'a, F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
+    Continuation<'a, F, X, U, N>
+{
+    /// Over a range of the parameter.
+    pub fn new(family: &'a F, tolerance: f64, range: [f64; 2], pace: Pace) -> Self {
+        Self {
+            family,
+            tolerance,
+            softness: 1.0,
+            range,
+            pace,
+            unit: family.scales().distance,
+        }
+    }
+
+    /// The shortest step.
+    pub(super) fn shortest(&self) -> f64 {
+        SHORTEST * self.unit
+    }
+
+    /// The station at a solution of the programme at a parameter, heading for larger ones, or for smaller.
+    pub fn start(
+        &self,
+        at: &Stationary<F::Point>,
+        parameter: f64,
+        rising: bool,
+    ) -> Option<Station<F::Point, N>> {
+        let mut at = at.clone();
+        let arrival = self.correct(&mut at, parameter, None)?;
+        let mut station = self.station(at, arrival, None)?;
+        if (station.tangent.parameter > 0.0) != rising {
+            station.tangent.turn_round();
+        }
+        Some(station)
+    }
+
+    /// Follows the curve from a station to the end of the range or of the budget. `proceed` is asked once a step whether to
+    /// go on, and may end the curve for a reason of its own.
+    pub fn trace<R>(
+        &self,
+        start: Station<F::Point, N>,
+        proceed: &mut dyn FnMut(f64) -> ControlFlow<R>,
+    ) -> Curve<F::Point, R, N> {
+        let mut curve = Curve {
+            stations: vec![start],
+            events: Vec::new(),
+            end: End::Budget,
+        };
+        let mut length = 0.2 * self.pace.longest;
+        while curve.stations.len() < self.pace.stations {
+            let last = curve.stations.last().expect("it began with one");
+            if let ControlFlow::Break(reason) = proceed(last.parameter) {
+                curve.end = End::Stopped(reason);
+                break;
+            }
+            let step = self.advance(last, &mut length);
+            let Some(step) = step.or_else(|| self.round_corner(last, &mut length)) else {
+                curve.end = End::Lost;
+                break;
+            };
+            if let Some(event) = step.event {
+                let is_last = self.pace.events == Events::EndAtFirst || event.turn == Turn::Apex;
+                curve.stations.push(event.station.clone());
+                curve.events.push((curve.stations.len() - 1, event));
+                if is_last {
+                    curve.end = End::Event;
+                    break;
+                }
+            }
+            curve.stations.push(step.station);
+            if step.arrived {
+                curve.end = End::Range;
+                break;
+            }
+            if self.is_closed(&curve.stations) {
+                curve.end = End::Closed;
+                break;
+            }
+        }
+        curve
+    }
+
+    /// The station of the curve that is followed, at a place a little before an event or beyond it.
+    pub fn beside(&self, event: &Event<F::Point, N>, by: f64) -> Option<Station<F::Point, N>> {
+        let mut at = event.station.at.clone();
+        let arrival = self.correct(&mut at, event.parameter + by, None)?;
+        self.station(at, arrival, None)
+    }
+
+    /// The change of the equalities' multipliers along the mode of an event.
+    pub fn multipliers_along(&self, event: &Event<F::Point, N>) -> Option<Vec<f64>> {
+        let program = self.family.at(event.station.parameter)?;
+        let mut at = event.station.at.clone();
+        let mut response = Response::of_stationary(&program, &mut at).ok()?;
+        let mut load = response.zero();
+        load.nodes = event.mode.force.iter().map(|force| -force).collect();
+        // Next to the event hardly anything resists along the mode: the answer is a large multiple of it.
+        let answer = response.solve_nearly(&load).ok()?;
+        let multiple = dot(&event.mode.force, &answer.nodes);
+        Some(answer.equalities.iter().map(|row| row / multiple).collect())
+    }
+
+    /// The minimum downhill from a station, at another value of the parameter; where it is a saddle, off along a mode.
+    pub fn descend(
+        &self,
+        from: &Station<F::Point, N>,
+        mode: &Mode<N>,
+        parameter: f64,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Option<Solution<F::Point>> {
+        /// First barrier.
+        const NEAR: f64 = 1e-5;
+        const ITERATIONS: usize = 300;
+        /// Length of the step off a saddle, in the unit of distance.
+        const OFF: f64 = 1e-3;
+        let settings = Settings {
+            tolerance: self.tolerance,
+            iterations: ITERATIONS,
+            barrier: NEAR,
+        };
+        let program = self.family.at(parameter)?;
+        let mut found = minimise(&program, &settings, from.at.point.clone(), proceed);
+        for off in [OFF, -OFF, 10.0 * OFF] {
+            if found.is_minimum() {
+                break;
+            }
+            let off = moved(&program, &from.at.point, mode, off * self.unit);
+            found = minimise(&program, &settings, off, proceed);
+        }
+        found.is_minimum().then_some(found)
+    }
+
+    /// The lowest modes at a station.
+    pub fn modes(&self, station: &Station<F::Point, N>, count: usize) -> Option<Vec<Mode<N>>> {
+        let program = self.family.at(station.parameter)?;
+        let response = Response::of_stationary(&program, &mut station.at.clone()).ok()?;
+        lowest_modes_of(response, &program.scales(), count).ok()
+    }
+
+    /// The next station, and what lies between; the length of the step is adapted.
+    pub(super) fn advance(
+        &self,
+        last: &Station<F::Point, N>,
+        length: &mut f64,
+    ) -> Option<Step<F::Point, N>> {
+        const LONGER: f64 = 1.5;
+        /// Cosine of the sharpest turn within a step.
+        const SHARPEST: f64 = 0.9;
+        loop {
+            let step = self.step(last, &last.tangent, *length);
+            let shortest = *length < 2.0 * self.shortest() && self.softness == 1.0;
+            let taken = step.filter(|next| {
+                let straight = last.cosine(next) > SHARPEST;
+                let apart = self.pace.events == Events::Ignore
+                    || last.negative.abs_diff(next.negative) <= 1;
+                shortest || (straight && apart)
+            });
+            let Some(next) = taken else {
+                *length *= 0.5;
+                if *length < self.shortest() {
+                    return None;
+                }
+                continue;
+            };
+            let event = match self.pace.events {
+                Events::Ignore => None,
+                Events::Find | Events::EndAtFirst => self.event_between(last, &next, *length),
+            };
+            let [low, high] = self.range;
+            if next.parameter < low || next.parameter > high {
+                let inside = event.filter(|event| (low..=high).contains(&event.station.parameter));
+                let from = inside.as_ref().map_or(last, |event| &event.station);
+                let end = next.parameter.clamp(low, high);
+                let station = self.land(from, &next, end)?;
+                return Some(Step {
+                    station,
+                    event: inside,
+                    arrived: true,
+                });
+            }
+            *length = (LONGER * *length).min(self.pace.longest);
+            return Some(Step {
+                station: next,
+                event,
+                arrived: false,
+            });
+        }
+    }
+
+    /// The station between two where the parameter has a value.
+    fn land(
+        &self,
+        from: &Station<F::Point, N>,
+        to: &Station<F::Point, N>,
+        parameter: f64,
+    ) -> Option<Station<F::Point, N>> {
+        let share = (parameter - from.parameter) / (to.parameter - from.parameter);
+        // A curve that begins there goes on to another such station.
+        let begins_there = from.parameter == parameter;
+        let nearer = if share < 0.5 && !begins_there {
+            from
+        } else {
+            to
+        };
+        let mut at = nearer.at.clone();
+        let arrival = self.correct(&mut at, parameter, None)?;
+        self.station(at, arrival, Some(&to.tangent))
+    }
+
+    /// Half of the complementarity that is allowed, as a barrier parameter.
+    pub(super) fn barrier(&self, program: &F::Program) -> f64 {
+        let layout = program.layout();
+        let weights = layout.stage_weights().iter().chain(layout.row_weights());
+        let heaviest = weights.copied().fold(0.0, f64::max);
+        0.5 * self.softness * self.tolerance / heaviest
+    }
+
+    /// Whether the last of the stations is where the first was, some way on.
+    fn is_closed(&self, stations: &[Station<F::Point, N>]) -> bool {
+        const SOME_WAY: usize = 10;
+        const SAME: f64 = 1e-6;
+        let [first, .., last] = stations else {
+            return false;
+        };
+        let objective = (first.objective - last.objective).abs();
+        let parameter = (first.parameter - last.parameter).abs();
+        stations.len() > SOME_WAY
+            && parameter <= SAME * self.unit
+            && objective <= SAME * first.objective.abs()
+    }
+}
+
+/// The stationary point, minimum or not, that Newton's method finds next to a point.
+pub fn settle<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>(
+    program: &P,
+    tolerance: f64,
+    mut near: Stationary<P::Point>,
+) -> Option<Solution<P::Point>>
+where
+    P::Point: Distance,
+{
+    let pace = Pace {
+        longest: 1.0,
+        stations: 1,
+        events: Events::Ignore,
+    };
+    let family = Alone(program);
+    let continuation = Continuation::new(&family, tolerance, [0.0, 1.0], pace);
+    continuation.correct(&mut near, 0.0, None)?;
+    Some(assess(program, tolerance, &near))
+}

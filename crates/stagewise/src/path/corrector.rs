@@ -1,0 +1,166 @@
+//! The corrector: Newton's method from near a curve onto it.
+
+use super::continuation::Continuation;
+use super::curve::{Station, Tangent};
+use super::family::Family;
+use crate::interior_point::Residuals;
+use crate::larger;
+use crate::linear::modes::dot;
+use crate::linear::{Direction, Response};
+use crate::program::{Program, Stationary};
+
+/// Where Newton's method has converged, factorised there.
+pub(super) struct Arrival<const X: usize, const U: usize, const N: usize> {
+    response: Response<X, U, N>,
+    parameter: f64,
+    residuals: Residuals,
+}
+
+impl<F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
+    Continuation<'_, F, X, U, N>
+{
+    /// The station so far along a direction from another.
+    pub(super) fn step(
+        &self,
+        from: &Station<F::Point, N>,
+        along: &Tangent<N>,
+        length: f64,
+    ) -> Option<Station<F::Point, N>> {
+        let mut at = from.at.clone();
+        let arrival = self.correct(&mut at, from.parameter, Some((along, length)))?;
+        self.station(at, arrival, Some(along))
+    }
+
+    /// Newton's method at a fixed parameter or, with a direction given, so far along that and at most so far aside, lest it end
+    /// on another curve.
+    pub(super) fn correct(
+        &self,
+        at: &mut Stationary<F::Point>,
+        mut parameter: f64,
+        along: Option<(&Tangent<N>, f64)>,
+    ) -> Option<Arrival<X, U, N>> {
+        const MOST: usize = 20;
+        /// Length below which a step aside is rounding, in the unit of distance.
+        const ROUNDING: f64 = 1e-6;
+        /// How far aside a step of no length may lead, as it softens the inequalities, in the unit of distance.
+        const BY_SOFTNESS: f64 = 0.02;
+        let mut left = along.map_or(0.0, |(_, length)| length);
+        let mut aside = 0.0;
+        for _ in 0..MOST {
+            let program = self.family.at(parameter)?;
+            let mut response = Response::of_stationary(&program, at).ok()?;
+            let barrier = self.barrier(&program);
+            let multipliers = &at.multipliers.inequalities;
+            let missed = response.conditions(multipliers, barrier);
+            let residuals = response.residuals(&missed, multipliers);
+            let is_met = larger(residuals.stationarity, residuals.constraint) <= self.tolerance
+                && response.is_centred(multipliers, barrier);
+            if is_met && left == 0.0 {
+                return Some(Arrival {
+                    response,
+                    parameter,
+                    residuals,
+                });
+            }
+            let mut step = response.solve_nearly(&missed).ok()?;
+            let mut moved = 0.0;
+            let mut drift = None;
+            if let Some((along, length)) = along {
+                let by_parameter = self.family.conditions_by_parameter(at, parameter)?;
+                let answer = response.solve_nearly(&by_parameter).ok()?;
+                moved = (left - dot(&along.force, &step.nodes))
+                    / (along.parameter + dot(&along.force, &answer.nodes));
+                if !moved.is_finite() {
+                    return None;
+                }
+                step.add(moved, &answer);
+                drift = Some(by_parameter);
+                let force = response.force_with_slacks(&step.nodes);
+                let way = dot(&force, &step.nodes) + moved * moved;
+                aside += (way - left * left).max(0.0).sqrt();
+                let widest = if length == 0.0 {
+                    BY_SOFTNESS * self.unit
+                } else {
+                    length.abs().max(ROUNDING * self.unit)
+                };
+                if aside > widest {
+                    return None;
+                }
+            }
+            let mut rates = response.slack_rates(&step.nodes);
+            if let Some(drift) = drift {
+                for (rate, drift) in rates.iter_mut().zip(&drift.inequalities) {
+                    *rate += moved * drift;
+                }
+            }
+            let taken = move_along(&program, &response, at, &step, &rates);
+            parameter += taken * moved;
+            left *= 1.0 - taken;
+        }
+        None
+    }
+
+    /// The station where Newton's method has arrived.
+    pub(super) fn station(
+        &self,
+        at: Stationary<F::Point>,
+        mut arrival: Arrival<X, U, N>,
+        before: Option<&Tangent<N>>,
+    ) -> Option<Station<F::Point, N>> {
+        let parameter = arrival.parameter;
+        let by_parameter = self.family.conditions_by_parameter(&at, parameter)?;
+        let negative = arrival.response.negative();
+        let motion = arrival.response.solve_nearly(&by_parameter).ok()?;
+        let mut tangent = Tangent {
+            force: arrival.response.force_with_slacks(&motion.nodes),
+            motion,
+            parameter: 1.0,
+        };
+        tangent.scale(tangent.dot(&tangent).sqrt().recip());
+        if before.is_some_and(|before| tangent.dot(before) < 0.0) {
+            tangent.turn_round();
+        }
+        Some(Station {
+            parameter,
+            at,
+            objective: arrival.response.values().objective,
+            residuals: arrival.residuals,
+            negative,
+            tangent,
+        })
+    }
+}
+
+/// Moves a point and its multipliers along a step, as far as slacks and multipliers stay positive, and gives the share of it
+/// that was taken. The rates are the slacks' changes along the whole step.
+fn move_along<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>(
+    program: &P,
+    response: &Response<X, U, N>,
+    at: &mut Stationary<P::Point>,
+    step: &Direction<N>,
+    rates: &[f64],
+) -> f64 {
+    /// Share of a slack or a multiplier that a step may take off.
+    const KEEP: f64 = 0.995;
+    let slacks = &response.values().slacks;
+    let mut primal = 1.0;
+    for (rate, slack) in rates.iter().zip(slacks) {
+        if *rate * primal < -KEEP * slack {
+            primal = -KEEP * slack / *rate;
+        }
+    }
+    let mut moved = at.point.clone();
+    program.retract(&at.point, &step.nodes, primal, &mut moved);
+    at.point = moved;
+    for (row, step) in at.multipliers.equalities.iter_mut().zip(&step.equalities) {
+        *row += primal * step;
+    }
+    for (row, multiplier) in at.multipliers.inequalities.iter_mut().enumerate() {
+        let next = *multiplier - primal * step.inequalities[row];
+        // The multiplier of an inequality that becomes inactive falls as its slack grows, and holds up no other.
+        let let_go = *multiplier * slacks[row] / (slacks[row] + primal * rates[row]);
+        let goes_on = next > (1.0 - KEEP) * *multiplier;
+        *multiplier = if goes_on { next } else { let_go };
+    }
+    primal
+}

@@ -1,0 +1,66 @@
+//! Programmes by one parameter.
+
+use crate::linear::{Direction, Response};
+use crate::program::{Distance, Program, Scales, Stationary};
+
+/// Programmes by one parameter.
+pub trait Family<const X: usize, const U: usize, const N: usize> {
+    /// A point of every programme.
+    type Point: Distance;
+    /// The programmes.
+    type Program: Program<X, U, N, Point = Self::Point>;
+
+    /// The programme at a value of the parameter; `None` where there is none.
+    fn at(&self, parameter: f64) -> Option<Self::Program>;
+
+    /// Units of the programmes; the parameter is measured in that of distance.
+    fn scales(&self) -> Scales {
+        Scales::default()
+    }
+
+    /// Derivative of the first-order conditions by the parameter; `None` where it cannot be told.
+    ///
+    /// Unless the family knows better: by central differences, one-sided at the end of the parameters that it knows.
+    fn conditions_by_parameter(
+        &self,
+        at: &Stationary<Self::Point>,
+        parameter: f64,
+    ) -> Option<Direction<N>> {
+        /// Step of the differences, in the unit of distance.
+        const STEP: f64 = 1e-5;
+        let h = STEP * self.scales().distance;
+        let conditions = |parameter: f64| {
+            let program = self.at(parameter)?;
+            Response::conditions_of(&program, at)
+        };
+        let (mut high, low, width) = match (conditions(parameter + h), conditions(parameter - h)) {
+            (Some(high), Some(low)) => (high, low, 2.0 * h),
+            (Some(high), None) => (high, conditions(parameter)?, h),
+            (None, Some(low)) => (conditions(parameter)?, low, h),
+            (None, None) => return None,
+        };
+        high.add(-1.0, &low);
+        high.scale(width.recip());
+        Some(high)
+    }
+}
+
+/// A single programme is a family too.
+pub(super) struct Alone<'a, P>(pub(super) &'a P);
+
+impl<'a, P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> Family<X, U, N>
+    for Alone<'a, P>
+where
+    P::Point: Distance,
+{
+    type Point = P::Point;
+    type Program = &'a P;
+
+    fn at(&self, _: f64) -> Option<&'a P> {
+        Some(self.0)
+    }
+
+    fn scales(&self) -> Scales {
+        self.0.scales()
+    }
+}

@@ -1,0 +1,433 @@
+//! What the solver asks of a programme, and what it answers with.
+
+use crate::layout::Layout;
+use crate::linear::chain::{Chain, Diagonal, NodeMatrix, NodeTerm, NodeVector, Stage, StageMatrix};
+use nalgebra::{SMatrix, SVector};
+
+/// What a programme is worth at a point.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Values {
+    /// Objective.
+    pub objective: f64,
+    /// Equality constraints, in the order of the [`Layout`]; met where zero.
+    pub equalities: Vec<f64>,
+    /// Slacks of the inequalities, in the order of the [`Layout`]; admissible where positive.
+    pub slacks: Vec<f64>,
+}
+
+/// Multipliers of a programme's constraints, in the order of the [`Layout`].
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Multipliers {
+    /// Of the equalities.
+    pub equalities: Vec<f64>,
+    /// Of the inequalities, not negative.
+    pub inequalities: Vec<f64>,
+}
+
+impl Multipliers {
+    /// Zero for every constraint.
+    pub fn zero(layout: &Layout) -> Self {
+        Self {
+            equalities: vec![0.0; layout.equalities()],
+            inequalities: vec![0.0; layout.inequalities()],
+        }
+    }
+
+    /// Takes over others of the same size, without allocating.
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        self.equalities.copy_from_slice(&other.equalities);
+        self.inequalities.copy_from_slice(&other.inequalities);
+    }
+}
+
+/// Units in which the numbers of a programme are of order one. What the solver calls small or large is so in these.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scales {
+    /// Unit of the objective.
+    pub objective: f64,
+    /// Unit of the distance between points: of [`Distance`] and of the square root of the metric.
+    pub distance: f64,
+}
+
+impl Default for Scales {
+    fn default() -> Self {
+        Self {
+            objective: 1.0,
+            distance: 1.0,
+        }
+    }
+}
+
+impl Scales {
+    /// Unit of the eigenvalues of the second variation: objective over squared distance.
+    pub fn eigenvalue(&self) -> f64 {
+        self.objective / (self.distance * self.distance)
+    }
+}
+
+/// A programme to second order at a point.
+#[derive(Debug, Clone)]
+pub struct Linearisation<const X: usize, const U: usize, const N: usize> {
+    /// How states are carried along the chain, and second derivatives by states and controls at once.
+    pub chain: Chain<U, N>,
+    /// Second derivatives by controls, by states, and at single nodes.
+    pub diagonal: Diagonal<X, U, N>,
+    /// Gradient of the Lagrangian of the equalities, by the unknowns of every node.
+    pub gradient: Vec<NodeVector<N>>,
+    /// Gradients of the equalities at nodes.
+    pub equalities_at: Vec<NodeVector<N>>,
+    /// Gradients of the equalities between pairs, by either node.
+    pub equalities_between: Vec<[NodeVector<N>; 2]>,
+    /// Gradients of the inequalities of stages, by the controls at either end.
+    pub stage_slacks: Vec<[SVector<f64, U>; 2]>,
+    /// Gradients of the inequalities of nodes.
+    pub node_slacks: Vec<NodeVector<N>>,
+    /// Gradients of the inequalities between pairs, by either node.
+    pub pair_slacks: Vec<[NodeVector<N>; 2]>,
+    layout: Layout,
+    /// Places among the terms at single nodes: of every block of equalities, then of every block of inequalities.
+    terms: Vec<usize>,
+}
+
+/// A nonlinear programme on a chain of nodes, of which each carries a state (`X` numbers) and controls (`U`); `N = X + U`.
+///
+/// The state of a node is not an unknown: it is carried along the chain from the first one, so that a point is always
+/// consistent. The unknowns are the state of the first node and the controls of all.
+pub trait Program<const X: usize, const U: usize, const N: usize> {
+    /// A point of the search space, which need not be a vector space.
+    type Point: Clone;
+
+    /// Number of stages, and what every constraint touches. It stays the same while a programme is being solved.
+    fn layout(&self) -> Layout;
+
+    /// Units in which the numbers of the programme are of order one.
+    fn scales(&self) -> Scales {
+        Scales::default()
+    }
+
+    /// Carries the states of a point along the chain and evaluates it; false outside the domain. Where inequalities alone
+    /// are broken it still gives slacks and equalities.
+    fn evaluate(&self, point: &mut Self::Point, values: &mut Values) -> bool;
+
+    /// Gradients of the equalities at nodes.
+    fn equality_gradients(&self, point: &Self::Point, into: &mut [NodeVector<N>]);
+
+    /// Derivatives at a point that has been evaluated, of the objective plus multipliers times equalities; the second ones
+    /// with multipliers times slacks of the inequalities taken off.
+    fn linearise(
+        &self,
+        point: &Self::Point,
+        multipliers: &Multipliers,
+        into: &mut Linearisation<X, U, N>,
+    );
+
+    /// Moves the unknowns of a point along a step; the states still have to be carried on.
+    fn retract(
+        &self,
+        point: &Self::Point,
+        step: &[NodeVector<N>],
+        length: f64,
+        into: &mut Self::Point,
+    );
+
+    /// The square of how far a change of its state moves each node, with its share in the whole: by this the eigenvalues of
+    /// the second variation are measured.
+    fn metric(&self, point: &Self::Point) -> Vec<SMatrix<f64, X, X>>;
+}
+
+impl<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> Program<X, U, N> for &P {
+    type Point = P::Point;
+
+    fn layout(&self) -> Layout {
+        (*self).layout()
+    }
+
+    fn scales(&self) -> Scales {
+        (*self).scales()
+    }
+
+    fn evaluate(&self, point: &mut Self::Point, values: &mut Values) -> bool {
+        (*self).evaluate(point, values)
+    }
+
+    fn equality_gradients(&self, point: &Self::Point, into: &mut [NodeVector<N>]) {
+        (*self).equality_gradients(point, into);
+    }
+
+    fn linearise(
+        &self,
+        point: &Self::Point,
+        multipliers: &Multipliers,
+        into: &mut Linearisation<X, U, N>,
+    ) {
+        (*self).linearise(point, multipliers, into);
+    }
+
+    fn retract(
+        &self,
+        point: &Self::Point,
+        step: &[NodeVector<N>],
+        length: f64,
+        into: &mut Self::Point,
+    ) {
+        (*self).retract(point, step, length, into);
+    }
+
+    fn metric(&self, point: &Self::Point) -> Vec<SMatrix<f64, X, X>> {
+        (*self).metric(point)
+    }
+}
+
+/// A point that can be kept and compared.
+pub trait Distance: Clone {
+    /// Takes over another of the same size, without allocating.
+    fn copy_from(&mut self, other: &Self);
+
+    /// How far apart two are, in the unit of [`Scales::distance`].
+    fn distance(&self, other: &Self) -> f64;
+}
+
+/// A point where the first-order conditions hold, or are meant to, with the multipliers that they take.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stationary<P> {
+    /// The point.
+    pub point: P,
+    /// The multipliers.
+    pub multipliers: Multipliers,
+}
+
+impl<P: Distance> Stationary<P> {
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        self.point.copy_from(&other.point);
+        self.multipliers.copy_from(&other.multipliers);
+    }
+}
+
+impl<const X: usize, const U: usize, const N: usize> Linearisation<X, U, N> {
+    /// Room for the derivatives of a programme of a layout.
+    pub fn new(layout: Layout) -> Self {
+        const { assert!(X + U == N) }
+        let stages = layout.stages();
+        let equalities = layout.equalities_at().iter().map(|block| block.at);
+        let inequalities = layout.inequalities_at().iter().map(|block| block.at);
+        let places: Vec<usize> = equalities.chain(inequalities).collect();
+        let mut order: Vec<usize> = (0..places.len()).collect();
+        order.sort_by_key(|block| places[*block]);
+        let mut terms = vec![0; places.len()];
+        for (term, block) in order.iter().enumerate() {
+            terms[*block] = term;
+        }
+        let term = |block: &usize| NodeTerm {
+            node: places[*block],
+            hessian: NodeMatrix::zeros(),
+        };
+        let pair_rows = layout.equalities() - layout.equalities_at_nodes();
+        let rows_of_nodes = layout.inequalities_at().iter().map(|block| block.rows);
+        let rows_of_pairs = layout.inequalities_between().iter();
+        let rows_of_pairs = rows_of_pairs.map(|block| block.rows);
+        let zero = NodeVector::zeros();
+        Self {
+            chain: Chain {
+                stages: vec![Stage::zero(); stages],
+                first_free: [true; U],
+            },
+            diagonal: Diagonal {
+                controls: vec![StageMatrix::zeros(); stages],
+                states: Vec::new(),
+                nodes: order.iter().map(term).collect(),
+            },
+            gradient: vec![zero; stages + 1],
+            equalities_at: vec![zero; layout.equalities_at_nodes()],
+            equalities_between: vec![[zero; 2]; pair_rows],
+            stage_slacks: vec![[SVector::zeros(); 2]; layout.inequalities_at_stages()],
+            node_slacks: vec![zero; rows_of_nodes.sum()],
+            pair_slacks: vec![[zero; 2]; rows_of_pairs.sum()],
+            layout,
+            terms,
+        }
+    }
+
+    /// The layout that it is of.
+    pub fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    /// Second derivative of multipliers times equalities of a block at a node, by the node's unknowns.
+    pub fn equality_hessian(&mut self, block: usize) -> &mut NodeMatrix<N> {
+        &mut self.diagonal.nodes[self.terms[block]].hessian
+    }
+
+    /// Minus the second derivative of multipliers times slacks of a block of inequalities of a node, by its unknowns.
+    pub fn inequality_hessian(&mut self, block: usize) -> &mut NodeMatrix<N> {
+        let block = self.layout.equalities_at().len() + block;
+        &mut self.diagonal.nodes[self.terms[block]].hessian
+    }
+
+    /// Place of a block among the terms at single nodes; blocks of inequalities follow those of equalities.
+    pub(crate) fn term(&self, block: usize) -> usize {
+        self.terms[block]
+    }
+
+    /// Change of every slack along a step, to first order.
+    pub(crate) fn slack_rates(&self, step: &[NodeVector<N>], into: &mut [f64]) {
+        let layout = &self.layout;
+        for stage in 0..layout.stages() {
+            for row in layout.stage_rows(stage) {
+                let [first, second] = &self.stage_slacks[row];
+                let ahead = along_controls::<X, U, N>(0.0, first, &step[stage]);
+                into[row] = along_controls::<X, U, N>(ahead, second, &step[stage + 1]);
+            }
+        }
+        let (_, rest) = into.split_at_mut(layout.inequalities_at_stages());
+        let mut rest = rest.iter_mut();
+        let mut node_slacks = self.node_slacks.iter();
+        for block in layout.inequalities_at() {
+            for (slack, rate) in node_slacks.by_ref().zip(rest.by_ref()).take(block.rows) {
+                *rate = slack.dot(&step[block.at]);
+            }
+        }
+        let mut pair_slacks = self.pair_slacks.iter();
+        for block in layout.inequalities_between() {
+            for ([a, b], rate) in pair_slacks.by_ref().zip(rest.by_ref()).take(block.rows) {
+                *rate = a.dot(&step[block.at[0]]) + b.dot(&step[block.at[1]]);
+            }
+        }
+    }
+
+    /// Adds to a gradient the slacks' gradients, each times a factor of its row.
+    pub(crate) fn add_slack_gradients(
+        &self,
+        factor: impl Fn(usize) -> f64,
+        into: &mut [NodeVector<N>],
+    ) {
+        let layout = &self.layout;
+        for stage in 0..layout.stages() {
+            for row in layout.stage_rows(stage) {
+                let factor = factor(row);
+                for (end, by) in self.stage_slacks[row].iter().enumerate() {
+                    for i in 0..U {
+                        into[stage + end][X + i] += factor * by[i];
+                    }
+                }
+            }
+        }
+        let mut row = layout.inequalities_at_stages();
+        let mut node_slacks = self.node_slacks.iter();
+        for block in layout.inequalities_at() {
+            for slack in node_slacks.by_ref().take(block.rows) {
+                into[block.at] += factor(row) * slack;
+                row += 1;
+            }
+        }
+        let mut pair_slacks = self.pair_slacks.iter();
+        for block in layout.inequalities_between() {
+            for slack in pair_slacks.by_ref().take(block.rows) {
+                for (node, by) in block.at.iter().zip(slack) {
+                    into[*node] += factor(row) * by;
+                }
+                row += 1;
+            }
+        }
+    }
+
+    /// Adds the equalities' gradients, each times its multiplier.
+    pub(crate) fn add_equality_gradients(&self, multipliers: &[f64], into: &mut [NodeVector<N>]) {
+        let (at, between) = multipliers.split_at(self.layout.equalities_at_nodes());
+        let mut rows = self.equalities_at.iter().zip(at);
+        for block in self.layout.equalities_at() {
+            let mut pull = NodeVector::zeros();
+            for (row, multiplier) in rows.by_ref().take(block.rows) {
+                pull += *multiplier * row;
+            }
+            into[block.at] += pull;
+        }
+        let mut rows = self.equalities_between.iter().zip(between);
+        for block in self.layout.equalities_between() {
+            let mut pulls = [NodeVector::zeros(); 2];
+            for (row, multiplier) in rows.by_ref().take(block.rows) {
+                pulls[0] += *multiplier * row[0];
+                pulls[1] += *multiplier * row[1];
+            }
+            for (node, pull) in block.at.iter().zip(pulls) {
+                into[*node] += pull;
+            }
+        }
+    }
+
+    /// Change of every equality along a step.
+    pub(crate) fn equality_rates(&self, step: &[NodeVector<N>], into: &mut [f64]) {
+        let (at, between) = into.split_at_mut(self.layout.equalities_at_nodes());
+        let mut rows = self.equalities_at.iter().zip(at);
+        for block in self.layout.equalities_at() {
+            for (row, rate) in rows.by_ref().take(block.rows) {
+                *rate = product(row, &step[block.at]);
+            }
+        }
+        let mut rows = self.equalities_between.iter().zip(between);
+        for block in self.layout.equalities_between() {
+            for (row, rate) in rows.by_ref().take(block.rows) {
+                *rate = product(&row[0], &step[block.at[0]]) + product(&row[1], &step[block.at[1]]);
+            }
+        }
+    }
+
+    /// Adds the second derivatives of stages, states and single nodes along a step.
+    pub(crate) fn add_second_derivatives(
+        &self,
+        step: &[NodeVector<N>],
+        into: &mut [NodeVector<N>],
+    ) {
+        let stages = self.chain.stages.iter().zip(&self.diagonal.controls);
+        for (k, (stage, own)) in stages.enumerate() {
+            let [first, second]: [SVector<f64, U>; 2] =
+                [k, k + 1].map(|node| step[node].fixed_rows::<U>(X).into_owned());
+            into[k] += stage.state_first * first + stage.state_second * second;
+            let mut by_first = own.first * first;
+            by_first.gemv(1.0, &own.mixed, &second, 1.0);
+            let mut by_second = own.mixed.tr_mul(&first);
+            by_second.gemv(1.0, &own.second, &second, 1.0);
+            by_first += stage.state_first.tr_mul(&step[k]);
+            by_second += stage.state_second.tr_mul(&step[k]);
+            let mut part = into[k].fixed_rows_mut::<U>(X);
+            part += by_first;
+            let mut part = into[k + 1].fixed_rows_mut::<U>(X);
+            part += by_second;
+        }
+        for (k, own) in self.diagonal.states.iter().enumerate() {
+            let mut by_state = into[k].fixed_rows_mut::<X>(0);
+            by_state += own * step[k].fixed_rows::<X>(0);
+        }
+        for term in &self.diagonal.nodes {
+            into[term.node] += term.hessian * step[term.node];
+        }
+    }
+
+    /// Keeps of the chain how it carries states and controls on, and nothing of what that costs.
+    pub(crate) fn forget_second_derivatives(&mut self) {
+        for stage in &mut self.chain.stages {
+            stage.state_first.fill(0.0);
+            stage.state_second.fill(0.0);
+        }
+        self.diagonal.states.clear();
+        self.diagonal.controls.fill(StageMatrix::zeros());
+        for term in &mut self.diagonal.nodes {
+            term.hessian.fill(0.0);
+        }
+    }
+}
+
+/// A sum, and to it the product of a gradient by controls with those of a node's step.
+#[inline(always)]
+fn along_controls<const X: usize, const U: usize, const N: usize>(
+    sum: f64,
+    by_controls: &SVector<f64, U>,
+    step: &NodeVector<N>,
+) -> f64 {
+    (0..U).fold(sum, |sum, i| sum + by_controls[i] * step[X + i])
+}
+
+/// Scalar product, summed in order.
+#[inline(always)]
+pub(crate) fn product<const N: usize>(a: &NodeVector<N>, b: &NodeVector<N>) -> f64 {
+    (0..N).fold(0.0, |sum, i| sum + a[i] * b[i])
+}
