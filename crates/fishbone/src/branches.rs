@@ -12,12 +12,15 @@ use crate::equilibrium::{
 };
 use crate::program::{BeltPoint, BeltProgram};
 use crate::scenario::{Method, Scenario};
-use crate::solver::{self, Mode, Stationary};
 use crate::twins::{SAME, are_twins};
 use nalgebra::{Vector2, Vector3};
+use stagewise::Stationary;
 use std::ops::ControlFlow;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// A mode of the programme.
+type Mode = stagewise::Mode<8>;
 
 /// Most minima that are kicked.
 const KICKED: usize = 96;
@@ -299,7 +302,7 @@ fn on_finer_mesh(
 fn lowest_modes(equilibrium: &Equilibrium, count: usize) -> Vec<Mode> {
     let solved = equilibrium.solved.as_ref().filter(|_| count > 0);
     let modes = solved.and_then(|solved| {
-        solver::lowest_modes(&solved.program, &mut solved.at.clone(), count).ok()
+        stagewise::lowest_modes(&solved.program, &mut solved.at.clone(), count).ok()
     });
     modes.unwrap_or_default()
 }
@@ -314,7 +317,7 @@ fn kicked_along(
     const FAR: [f64; 4] = [0.1, -0.1, 0.3, -0.3];
     let solved = from.solved.iter();
     let starts = solved.flat_map(|solved| {
-        FAR.map(|far| solver::moved(&solved.program, &solved.at.point, mode, far))
+        FAR.map(|far| stagewise::moved(&solved.program, &solved.at.point, mode, far))
     });
     starts
         .map(|start| minimum_from(scenario, &start, &mut || watch.proceed()))
@@ -335,13 +338,13 @@ fn pushed_over(
     let program = &solved.program;
     let tolerance = scenario.solver.tolerance;
     let proceed = &mut |_| watch.proceed();
-    let other = solver::pushed_over(program, tolerance, &solved.at, mode, forth, proceed);
+    let other = stagewise::over_modal_load(program, tolerance, &solved.at, mode, forth, proceed);
     let Some(other) = other else {
         return Vec::new();
     };
     let mut found = downhill(scenario, program, &other, watch);
     if is_settled(scenario, program, &other.point) {
-        let solution = solver::assess(program, tolerance, &other);
+        let solution = stagewise::assess(program, tolerance, &other);
         found.push(of_solution(scenario, program.clone(), solution));
     }
     found
@@ -355,10 +358,11 @@ fn downhill(
     watch: &dyn Watch,
 ) -> Vec<Equilibrium> {
     const OFF: f64 = 0.01;
-    let modes = solver::lowest_modes(program, &mut saddle.clone(), 1).unwrap_or_default();
+    let modes = stagewise::lowest_modes(program, &mut saddle.clone(), 1).unwrap_or_default();
     let falling = modes.into_iter().filter(|mode| mode.eigenvalue < 0.0);
-    let sides = falling
-        .flat_map(|mode| [OFF, -OFF].map(|off| solver::moved(program, &saddle.point, &mode, off)));
+    let sides = falling.flat_map(|mode| {
+        [OFF, -OFF].map(|off| stagewise::moved(program, &saddle.point, &mode, off))
+    });
     sides
         .map(|side| minimum_from(scenario, &side, &mut || watch.proceed()))
         .collect()

@@ -7,8 +7,7 @@ pub mod block;
 
 use crate::energy::{Curl, EnergyModel, Term};
 use crate::lie::{Pose, Twist, gauss_points, magnus};
-use crate::solver::BOUNDS;
-use crate::strip::{Across, Edge, FURTHER, SlopeJet, Strips};
+use crate::strip::{Across, BOUNDS, Edge, FURTHER, SlopeJet, Strips};
 use nalgebra::{Matrix2, Matrix2x4, Matrix4, Vector3, Vector4};
 
 /// Torsion ω_η = −β ω_ζ.
@@ -232,7 +231,10 @@ fn fields_by_nodes(t: f64) -> Matrix2x4<f64> {
 mod tests {
     use super::block::{Block, LANES, Motions};
     use super::*;
-    use crate::solver::chain::{ByControl, NodeVector, Stage};
+    use stagewise::Stage;
+
+    type NodeVector = stagewise::NodeVector<8>;
+    type ByControls = stagewise::ByControls<2, 8>;
     use nalgebra::{Matrix3, SMatrix, SVector};
     use num_dual::{DualNum, hessian};
 
@@ -508,10 +510,10 @@ mod tests {
     }
 
     /// Half the work of the wrench on the bracket of a unit twist and each column.
-    fn mixed_by_bracket(growth: &ByControl, wrench: &NodeVector) -> ByControl {
+    fn mixed_by_bracket(growth: &ByControls, wrench: &NodeVector) -> ByControls {
         let twist =
             |column: &NodeVector| Twist::from_vector(&column.fixed_rows::<6>(0).into_owned());
-        ByControl::from_fn(|row, column| match row {
+        ByControls::from_fn(|row, column| match row {
             0..6 => {
                 let grown = twist(&growth.column(column).into_owned());
                 let unit = twist(&NodeVector::ith(row, 1.0));

@@ -11,12 +11,12 @@ use crate::guess::{guess, waved};
 use crate::lie::Pose;
 use crate::program::{BeltPoint, BeltProgram, Piece};
 use crate::scenario::{BeltSpec, LinkSpec, Method, SAME_PLACE, Scenario, SupportSpec};
-use crate::solver::{self, Inertia, Residuals, Solution, Stationary};
 use crate::spine::Spine;
 use crate::stability::Stability;
 use crate::strip::{Edge, FURTHER};
 use nalgebra::{Vector2, Vector3};
 use serde::Serialize;
+use stagewise::{Inertia, Multipliers, Residuals, Solution, Stationary};
 use std::ops::ControlFlow;
 
 /// How a solve ended.
@@ -166,13 +166,19 @@ impl Equilibrium {
             let is_near = self.displacement(&found) <= NEAR;
             return (found.status == Status::Converged && is_near).then_some(found);
         }
-        let (from, bounds) = (&solved.program, &solved.at.bound_multipliers);
+        let (from, multipliers) = (&solved.program, &solved.at.multipliers);
         let at = Stationary {
             point: shape,
-            multipliers: solved.at.multipliers.clone(),
-            bound_multipliers: search::prolong_bounds(from, bounds, &program),
+            multipliers: Multipliers {
+                equalities: multipliers.equalities.clone(),
+                inequalities: search::prolong_inequalities(
+                    from,
+                    &multipliers.inequalities,
+                    &program,
+                ),
+            },
         };
-        let solution = solver::settle(&program, scenario.solver.tolerance, at)?;
+        let solution = stagewise::settle(&program, scenario.solver.tolerance, at)?;
         let is_like = solution.inertia == solved.inertia;
         is_like.then(|| of_solution(&scenario, program, solution))
     }

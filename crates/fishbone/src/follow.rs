@@ -6,17 +6,54 @@ use crate::equilibrium::{
 use crate::path::Path;
 use crate::program::{BeltPoint, BeltProgram};
 use crate::scenario::Scenario;
-use crate::solver::{
-    self, Continuation, Curve, Events, Family, Pace, Residuals, Shape, Station, Stationary, Turn,
-};
 use crate::stability::Stability;
 use crate::surface;
 use crate::twins::{SAME, are_twins};
 use nalgebra::Vector3;
+use stagewise::{Continuation, Distance, Events, Family, Pace, Residuals, Stationary, Turn};
 use std::ops::ControlFlow;
 use thiserror::Error;
 
-pub use crate::solver::End;
+/// A station of a branch.
+type Station = stagewise::Station<BeltPoint, 8>;
+/// A place where the number of negative modes changes.
+type Crossing = stagewise::Event<BeltPoint, 8>;
+/// A curve of equilibria that may have been interrupted.
+type Curve = stagewise::Curve<BeltPoint, (), 8>;
+
+/// Why a branch ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum End {
+    /// The path ends.
+    Range,
+    /// At an event beyond which the branch would be its own mirror image.
+    Event,
+    /// The branch has come back to where it began.
+    Closed,
+    /// All states that were allowed are used up.
+    Budget,
+    /// No step, however short, leads on.
+    Lost,
+    /// Ribs reach edges beside a bend that held none before, or leave those that held them.
+    Edges,
+    /// The belt is drawn straight.
+    Taut,
+    /// The caller asked to end.
+    Interrupted,
+}
+
+impl From<stagewise::End<()>> for End {
+    fn from(end: stagewise::End<()>) -> Self {
+        match end {
+            stagewise::End::Range => Self::Range,
+            stagewise::End::Event => Self::Event,
+            stagewise::End::Closed => Self::Closed,
+            stagewise::End::Budget => Self::Budget,
+            stagewise::End::Lost => Self::Lost,
+            stagewise::End::Stopped(()) => Self::Interrupted,
+        }
+    }
+}
 
 /// Why there is nothing to follow.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -180,7 +217,8 @@ pub(crate) struct Along<'a> {
     pub(crate) mesh: &'a Mesh,
 }
 
-impl Family for Along<'_> {
+impl Family<6, 2, 8> for Along<'_> {
+    type Point = BeltPoint;
     type Program = BeltProgram;
 
     fn at(&self, place: f64) -> Option<BeltProgram> {
@@ -245,23 +283,24 @@ pub fn follow(
 
 /// A diagram in the making.
 struct Search<'a, 'b> {
-    continuation: Continuation<'a, Along<'a>>,
+    continuation: Continuation<'a, Along<'a>, 6, 2, 8>,
     proceed: &'b mut dyn FnMut(usize, f64) -> ControlFlow<()>,
     diagram: Diagram,
 }
 
 impl Search<'_, '_> {
     /// Traces a branch, then those that branch off it.
-    fn trace(&mut self, origin: Option<Origin>, start: Station<BeltPoint>) {
+    fn trace(&mut self, origin: Option<Origin>, start: Station) {
         let index = self.diagram.branches.len();
         let curve = self
             .continuation
             .trace(start, &mut |place| (self.proceed)(index, place));
-        let Curve {
-            stations,
-            events,
+        let (
+            Curve {
+                stations, events, ..
+            },
             end,
-        } = self.settled(curve);
+        ) = self.settled(curve);
         if stations.is_empty() {
             return;
         }
@@ -309,9 +348,10 @@ impl Search<'_, '_> {
     }
 
     /// A curve as far as the ribs are held by the edges that they reach, and no other.
-    fn settled(&self, mut curve: Curve<BeltPoint>) -> Curve<BeltPoint> {
+    fn settled(&self, mut curve: Curve) -> (Curve, End) {
+        let mut end = End::from(curve.end);
         let Diagram { path, mesh, .. } = &self.diagram;
-        let is_unsettled = |station: &Station<BeltPoint>| {
+        let is_unsettled = |station: &Station| {
             let scenario = path.at(station.parameter);
             let program = scenario.and_then(|s| Some((mesh.program(&s)?, s)));
             program.is_none_or(|(program, scenario)| {
@@ -321,26 +361,22 @@ impl Search<'_, '_> {
         if let Some(first) = curve.stations.iter().position(is_unsettled) {
             curve.stations.truncate(first);
             curve.events.retain(|(state, _)| *state < first);
-            curve.end = End::Edges;
+            end = End::Edges;
         }
         let reached = curve.stations.last().map(|station| station.parameter);
-        let is_open = matches!(curve.end, End::Event | End::Lost);
+        let is_open = matches!(end, End::Event | End::Lost);
         if is_open && reached.is_some_and(|place| is_taut_beyond(path, place)) {
             // Through the flat belt it would go over into its mirror image.
             curve.events.retain(|(_, event)| event.turn != Turn::Apex);
-            curve.end = End::Taut;
+            end = End::Taut;
         }
-        curve
+        (curve, end)
     }
 
     /// The stations of other branches that cross at an event, a little before it or beyond.
     ///
     /// From beside the event a push along the mode that is about to vanish leads over to them.
-    fn crossing(
-        &mut self,
-        event: &solver::Event<BeltPoint>,
-        before: &[Station<BeltPoint>],
-    ) -> Vec<Station<BeltPoint>> {
+    fn crossing(&mut self, event: &Crossing, before: &[Station]) -> Vec<Station> {
         /// As near to where a branch is its own mirror image a push off it begins.
         const BEFORE: [f64; 4] = [5e-3, 1e-3, 2e-2, 2e-4];
         const BESIDE: [f64; 3] = [2e-3, 5e-4, 1e-2];
@@ -353,7 +389,7 @@ impl Search<'_, '_> {
                 let mut found = BEFORE.into_iter().map(|far| {
                     let before = before_by(far, event, before);
                     let others = self.pushed_off(before, &event.mode);
-                    let is_other = |other: &Station<BeltPoint>| other.negative != before.negative;
+                    let is_other = |other: &Station| other.negative != before.negative;
                     let others = others.into_iter().flatten().flatten().filter(is_other);
                     others.collect::<Vec<_>>()
                 });
@@ -368,8 +404,7 @@ impl Search<'_, '_> {
                     continue;
                 };
                 let others = self.pushed_off(&beside, &event.mode);
-                let near =
-                    |other: &Station<BeltPoint>| other.at.point.distance(&beside.at.point) < NEAR;
+                let near = |other: &Station| other.at.point.distance(&beside.at.point) < NEAR;
                 found.extend(others.into_iter().flatten().flatten().filter(near));
             }
             if !found.is_empty() {
@@ -382,9 +417,9 @@ impl Search<'_, '_> {
     /// The stations on other branches that are reached from one, at its place, by a push along a mode and against it.
     fn pushed_off(
         &mut self,
-        from: &Station<BeltPoint>,
-        mode: &solver::Mode,
-    ) -> Option<[Option<Station<BeltPoint>>; 2]> {
+        from: &Station,
+        mode: &stagewise::Mode<8>,
+    ) -> Option<[Option<Station>; 2]> {
         let Self {
             continuation,
             proceed,
@@ -395,7 +430,7 @@ impl Search<'_, '_> {
         let tolerance = path.base().solver.tolerance;
         let mut pushed = |forth| {
             let ask = &mut |_| proceed(branch, from.parameter);
-            let at = solver::pushed_over(&program, tolerance, &from.at, mode, forth, ask)?;
+            let at = stagewise::over_modal_load(&program, tolerance, &from.at, mode, forth, ask)?;
             continuation.start(&at, from.parameter, true)
         };
         Some([pushed(true), pushed(false)])
@@ -403,7 +438,7 @@ impl Search<'_, '_> {
 
     /// Which ways to follow a branch from a station beside an event: away from where it crosses, or both where it is the one
     /// that goes straight through.
-    fn ways(&self, event: &solver::Event<BeltPoint>, side: &Station<BeltPoint>) -> Vec<bool> {
+    fn ways(&self, event: &Crossing, side: &Station) -> Vec<bool> {
         let away = side.parameter > event.parameter;
         match event.turn {
             Turn::Apex => vec![true, false],
@@ -412,16 +447,16 @@ impl Search<'_, '_> {
     }
 
     /// Of two that are mirror images the one that bulges as the scenario asks; else all.
-    fn different(&self, stations: Vec<Station<BeltPoint>>) -> Vec<Station<BeltPoint>> {
+    fn different(&self, stations: Vec<Station>) -> Vec<Station> {
         let bulge = Vector3::from(self.diagram.path.base().solver.bulge);
-        let reach = |station: &Station<BeltPoint>| {
+        let reach = |station: &Station| {
             let poses = station.at.point.poses.iter();
             let reach = poses.map(|pose| pose.position.dot(&bulge));
             reach.fold(f64::NEG_INFINITY, f64::max)
         };
-        let mut different: Vec<Station<BeltPoint>> = Vec::new();
+        let mut different: Vec<Station> = Vec::new();
         for station in stations {
-            let is_twin = |other: &&mut Station<BeltPoint>| {
+            let is_twin = |other: &&mut Station| {
                 are_twins(&other.at.point.poses, &station.at.point.poses, SAME)
             };
             match different.iter_mut().find(is_twin) {
@@ -434,15 +469,10 @@ impl Search<'_, '_> {
     }
 
     /// Where the belt goes that is led on past an event.
-    fn snapped(
-        &mut self,
-        event: &solver::Event<BeltPoint>,
-        crossing: &[Station<BeltPoint>],
-        onwards: f64,
-    ) -> Option<Snapped> {
+    fn snapped(&mut self, event: &Crossing, crossing: &[Station], onwards: f64) -> Option<Snapped> {
         const PAST: f64 = 1e-4;
         let place = event.parameter + PAST * onwards;
-        let beyond = |station: &&Station<BeltPoint>| {
+        let beyond = |station: &&Station| {
             station.negative == 0 && (station.parameter - event.parameter) * onwards > 0.0
         };
         let from = crossing.iter().find(beyond).unwrap_or(&event.station);
@@ -459,13 +489,8 @@ impl Search<'_, '_> {
 }
 
 /// The last station at least so far before an event, else the first.
-fn before_by<'a>(
-    far: f64,
-    event: &solver::Event<BeltPoint>,
-    stations: &'a [Station<BeltPoint>],
-) -> &'a Station<BeltPoint> {
-    let is_before =
-        |station: &&Station<BeltPoint>| (station.parameter - event.parameter).abs() >= far;
+fn before_by<'a>(far: f64, event: &Crossing, stations: &'a [Station]) -> &'a Station {
+    let is_before = |station: &&Station| (station.parameter - event.parameter).abs() >= far;
     stations
         .iter()
         .rev()
@@ -474,8 +499,8 @@ fn before_by<'a>(
 }
 
 /// What an event is, by where the other branches are.
-fn kind(event: &solver::Event<BeltPoint>, crossing: &[Station<BeltPoint>]) -> Kind {
-    let beyond = |station: &&Station<BeltPoint>| station.parameter > event.parameter;
+fn kind(event: &Crossing, crossing: &[Station]) -> Kind {
+    let beyond = |station: &&Station| station.parameter > event.parameter;
     match (event.turn, crossing.iter().filter(beyond).count()) {
         (Turn::Fold, _) => Kind::Fold,
         (Turn::Apex | Turn::Bifurcation, _) if crossing.is_empty() => Kind::Bifurcation,
@@ -493,7 +518,7 @@ impl Summary {
 }
 
 impl State {
-    fn of(station: &Station<BeltPoint>) -> Self {
+    fn of(station: &Station) -> Self {
         Self {
             place: station.parameter,
             negative_modes: station.negative,
@@ -526,7 +551,7 @@ impl Diagram {
         let program = self.mesh.program(&scenario);
         let program = program.expect("it was solved there");
         let at = &self.branches[branch].states[state].at;
-        let solution = solver::assess(&program, scenario.solver.tolerance, at);
+        let solution = stagewise::assess(&program, scenario.solver.tolerance, at);
         of_solution(&scenario, program, solution)
     }
 
@@ -555,7 +580,7 @@ impl Diagram {
     }
 
     /// Whether a branch passes through a station, as far as its states tell by straight lines between them.
-    fn passes_through(&self, station: &Station<BeltPoint>) -> bool {
+    fn passes_through(&self, station: &Station) -> bool {
         self.branches.iter().any(|branch| {
             let pairs = branch.states.windows(2);
             pairs
@@ -566,7 +591,7 @@ impl Diagram {
 }
 
 /// Whether a station lies between two states of a branch.
-fn lies_between(station: &Station<BeltPoint>, [a, b]: [&State; 2]) -> bool {
+fn lies_between(station: &Station, [a, b]: [&State; 2]) -> bool {
     const NEAR: f64 = 2e-3;
     const SAG: f64 = 0.05;
     let share = (station.parameter - a.place) / (b.place - a.place);

@@ -45,7 +45,6 @@ pub mod result;
 pub mod ritz;
 pub mod scenario;
 pub mod sensitivity;
-pub mod solver;
 pub mod spine;
 pub mod stability;
 pub mod strip;

@@ -4,11 +4,14 @@ use crate::equilibrium::{Equilibrium, Mesh, Status, is_settled};
 use crate::follow::{NoBranch, is_taut_beyond};
 use crate::lie::{Pose, exp, log};
 use crate::path::{Motion, Path};
-use crate::program::{BeltPoint, BeltProgram};
-use crate::solver::{Continuation, End, Events, Family, Pace, Station, Turn};
+use crate::program::{BeltPoint, BeltProgram, rows_of};
 use nalgebra::{Vector3, Vector6};
+use stagewise::{Continuation, End, Events, Family, Pace, Turn};
 use std::ops::ControlFlow;
 use thiserror::Error;
+
+/// A station of a branch.
+type Station = stagewise::Station<BeltPoint, 8>;
 
 /// A way to the loss of stability.
 #[derive(Debug, Clone, PartialEq)]
@@ -223,7 +226,7 @@ impl Equilibrium {
         let start = start.ok_or(NoBranch::Singular)?;
         let curve = continuation.trace(start, &mut |_| proceed());
         let length = way.path.length();
-        let is_open = |station: &Station<BeltPoint>| station.negative == 0 && way.holds(station);
+        let is_open = |station: &Station| station.negative == 0 && way.holds(station);
         let stable = curve
             .stations
             .iter()
@@ -238,7 +241,7 @@ impl Equilibrium {
         else {
             let goes_on = stable == curve.stations.len();
             return match curve.end {
-                End::Range | End::Interrupted if goes_on => Ok(None),
+                End::Range | End::Stopped(()) if goes_on => Ok(None),
                 _ if is_taut => Ok(None),
                 _ => Err(NoMargin::Lost(last / length)),
             };
@@ -249,7 +252,7 @@ impl Equilibrium {
         let across = rows.map(|rows| {
             let held = &solved.program.supports[support];
             let at = &event.station.at.point.poses[held.node];
-            let (force, moment) = held.reaction(at, &rows[support]);
+            let (force, moment) = held.reaction(at, &rows_of(&rows, support));
             Vector6::from_iterator(force.iter().chain(&moment).copied()).normalize()
         });
         Ok(Some(Boundary {
@@ -321,7 +324,7 @@ impl Way {
         displaced(&self.from, &self.direction, self.length, far)
     }
 
-    fn continuation(&self) -> Continuation<'_, Self> {
+    fn continuation(&self) -> Continuation<'_, Self, 6, 2, 8> {
         const PACE: Pace = Pace {
             longest: 0.05,
             stations: 1000,
@@ -332,7 +335,7 @@ impl Way {
     }
 
     /// Whether the ribs are held by the edges that they reach, and by no other.
-    fn holds(&self, station: &Station<BeltPoint>) -> bool {
+    fn holds(&self, station: &Station) -> bool {
         let scenario = self.path.at(station.parameter);
         let program = scenario.and_then(|scenario| Some((self.mesh.program(&scenario)?, scenario)));
         program
@@ -349,7 +352,8 @@ fn displaced(from: &Pose, direction: &Vector6<f64>, unit: f64, far: f64) -> Pose
     }
 }
 
-impl Family for Way {
+impl Family<6, 2, 8> for Way {
+    type Point = BeltPoint;
     type Program = BeltProgram;
 
     fn at(&self, place: f64) -> Option<BeltProgram> {

@@ -18,14 +18,29 @@ use crate::element::Element;
 use crate::element::block::{Block, LANES, Motions};
 use crate::energy::EnergyModel;
 use crate::lie::{Pose, Twist, hat};
-use crate::solver::chain::NodeVector;
-use crate::solver::{BOUNDS, Bounds, Linearisation, Program, Rows, RowsByNode, Shape, Values};
 use crate::spine::turn;
-use crate::strip::FURTHER;
 use nalgebra::{
-    Matrix3, Matrix3x6, Matrix4, Matrix6, Rotation3, UnitQuaternion, Vector2, Vector3, Vector4,
-    Vector6,
+    Matrix3, Matrix3x6, Matrix6, Rotation3, SMatrix, SVector, UnitQuaternion, Vector2, Vector3,
+    Vector4, Vector6,
 };
+use stagewise::{Distance, Layout, Linearisation, Multipliers, Program, StageMatrix, Values};
+
+/// Unknowns of a node: a twist of the pose in world axes about the origin, then bend and rib slope.
+pub type NodeVector = stagewise::NodeVector<8>;
+/// A quadratic form in the unknowns of a node.
+pub type NodeMatrix = stagewise::NodeMatrix<8>;
+
+/// Rows of the conditions of one support or link.
+pub const ROWS: usize = 6;
+/// Values or multipliers of the conditions of one support or link; unused rows are zero.
+pub type Rows = SVector<f64, ROWS>;
+/// Derivative of the conditions of one support or link by a node's unknowns; unused rows are zero.
+pub type RowsByNode = SMatrix<f64, ROWS, 8>;
+
+/// The multipliers of a support or link, by its place: supports first, then links.
+pub fn rows_of(multipliers: &[f64], place: usize) -> Rows {
+    Rows::from_column_slice(&multipliers[ROWS * place..ROWS * (place + 1)])
+}
 
 /// What joins a node to the next.
 #[expect(
@@ -78,7 +93,7 @@ pub struct BeltPoint {
     pub poses: Vec<Pose>,
 }
 
-impl Shape for BeltPoint {
+impl Distance for BeltPoint {
     fn copy_from(&mut self, other: &Self) {
         self.fields.copy_from_slice(&other.fields);
         self.poses.copy_from_slice(&other.poses);
@@ -366,14 +381,15 @@ impl BeltProgram {
     /// Derivatives of all work by the twist of the belt from each node on: what acts at it and beyond.
     ///
     /// A wrench about the origin is the same all along the belt but where something acts.
-    fn wrenches(&self, point: &BeltPoint, multipliers: &[Rows], into: &mut [NodeVector]) {
-        let (at_nodes, between) = multipliers.split_at(self.supports.len());
-        for (support, rows) in self.supports.iter().zip(at_nodes) {
-            into[support.node] += support.jacobian(&point.poses[support.node]).tr_mul(rows);
+    fn wrenches(&self, point: &BeltPoint, multipliers: &[f64], into: &mut [NodeVector]) {
+        for (i, support) in self.supports.iter().enumerate() {
+            let rows = rows_of(multipliers, i);
+            into[support.node] += support.jacobian(&point.poses[support.node]).tr_mul(&rows);
         }
-        for (link, rows) in self.links.iter().zip(between) {
+        for (i, link) in self.links.iter().enumerate() {
+            let rows = rows_of(multipliers, self.supports.len() + i);
             for (node, by_node) in link.nodes.iter().zip(link.jacobian(point)) {
-                into[*node] += by_node.tr_mul(rows);
+                into[*node] += by_node.tr_mul(&rows);
             }
         }
         let mut add = |node: usize, load: &DeadForce| {
@@ -407,7 +423,7 @@ impl BeltProgram {
     pub fn internal(
         &self,
         point: &BeltPoint,
-        multipliers: &[Rows],
+        multipliers: &[f64],
     ) -> Vec<(Vector3<f64>, Vector3<f64>)> {
         let last = self.pieces.len();
         let mut wrenches = vec![NodeVector::zeros(); last + 1];
@@ -444,77 +460,69 @@ impl BeltProgram {
     pub fn reactions(
         &self,
         point: &BeltPoint,
-        multipliers: &[Rows],
+        multipliers: &[f64],
     ) -> Vec<(Vector3<f64>, Vector3<f64>)> {
-        self.supports
-            .iter()
-            .zip(multipliers)
-            .map(|(support, rows)| support.reaction(&point.poses[support.node], rows))
+        let supports = self.supports.iter().enumerate();
+        supports
+            .map(|(i, support)| {
+                support.reaction(&point.poses[support.node], &rows_of(multipliers, i))
+            })
             .collect()
     }
 
     /// Force of every link on its second node, world axes; on the first it is the opposite.
-    pub fn link_forces(&self, multipliers: &[Rows]) -> Vec<Vector3<f64>> {
-        multipliers[self.supports.len()..]
-            .iter()
-            .map(|rows| -rows.fixed_rows::<3>(0).into_owned())
+    pub fn link_forces(&self, multipliers: &[f64]) -> Vec<Vector3<f64>> {
+        let links = (0..self.links.len()).map(|i| self.supports.len() + i);
+        links
+            .map(|place| -rows_of(multipliers, place).fixed_rows::<3>(0).into_owned())
             .collect()
     }
 }
 
-impl Program for BeltProgram {
+impl Program<6, 2, 8> for BeltProgram {
     type Point = BeltPoint;
 
-    fn stages(&self) -> usize {
-        self.pieces.len()
-    }
-
-    fn constrained_nodes(&self) -> Vec<usize> {
-        self.supports.iter().map(|support| support.node).collect()
-    }
-
-    fn linked_nodes(&self) -> Vec<[usize; 2]> {
-        self.links.iter().map(|link| link.nodes).collect()
-    }
-
-    fn bounds(&self) -> usize {
-        let mut elements = self.elements();
-        match elements.any(|(_, element)| element.further != [None; FURTHER]) {
-            true => BOUNDS,
-            false => BOUNDS - FURTHER,
-        }
-    }
-
-    fn weights(&self) -> Vec<f64> {
+    fn layout(&self) -> Layout {
         let weight = |piece: &Piece| match piece {
             Piece::Strip(element) => element.length,
             Piece::Rigid { .. } | Piece::Joint { .. } => 0.0,
         };
-        self.pieces.iter().map(weight).collect()
+        let bounds = |piece: &Piece| match piece {
+            Piece::Strip(element) => element.strips().bounds().count(),
+            Piece::Rigid { .. } | Piece::Joint { .. } => 0,
+        };
+        let layout = Layout::new(self.pieces.iter().map(weight).collect())
+            .with_stage_inequalities(self.pieces.iter().map(bounds));
+        let supports = self.supports.iter();
+        let layout = supports.fold(layout, |layout, support| {
+            layout.with_equalities_at(support.node, ROWS)
+        });
+        let links = self.links.iter();
+        links.fold(layout, |layout, link| {
+            layout.with_equalities_between(link.nodes, ROWS)
+        })
     }
 
     fn evaluate(&self, point: &mut BeltPoint, values: &mut Values) -> bool {
         values.slacks.clear();
-        for (k, piece) in self.pieces.iter().enumerate() {
-            values.slacks.push(match piece {
-                Piece::Strip(element) => element.slacks(&Self::fields_of(&point.fields, k)),
-                Piece::Rigid { .. } | Piece::Joint { .. } => [1.0; BOUNDS],
-            });
+        for (k, element) in self.elements() {
+            let slacks = element.slacks(&Self::fields_of(&point.fields, k));
+            let bounds = element.strips().bounds();
+            values.slacks.extend(bounds.map(|bound| slacks[bound]));
         }
-        values.constraints.clear();
+        values.equalities.clear();
         if self.rib_leaves_through_bend(point) {
             return false;
         }
         self.carry(point);
-        let supports = self.supports.iter();
-        values
-            .constraints
-            .extend(supports.map(|s| s.value(&point.poses[s.node])));
-        let links = self.links.iter();
-        values
-            .constraints
-            .extend(links.map(|link| link.value(point)));
-        let admissible = values.slacks.iter().flatten().all(|slack| *slack > 0.0);
+        for support in &self.supports {
+            let rows = support.value(&point.poses[support.node]);
+            values.equalities.extend(&rows);
+        }
+        for link in &self.links {
+            values.equalities.extend(&link.value(point));
+        }
+        let admissible = values.slacks.iter().all(|slack| *slack > 0.0);
         if admissible {
             values.objective =
                 self.elastic_energy(&point.fields) + self.load_potential(&point.poses);
@@ -522,19 +530,22 @@ impl Program for BeltProgram {
         admissible && values.objective.is_finite()
     }
 
-    fn constraint_jacobians(&self, point: &BeltPoint, into: &mut [RowsByNode]) {
-        for (support, rows) in self.supports.iter().zip(into) {
-            *rows = support.jacobian(&point.poses[support.node]);
+    fn equality_gradients(&self, point: &BeltPoint, into: &mut [NodeVector]) {
+        for (support, rows) in self.supports.iter().zip(into.chunks_exact_mut(ROWS)) {
+            let jacobian = support.jacobian(&point.poses[support.node]);
+            for (row, gradient) in rows.iter_mut().zip(jacobian.row_iter()) {
+                row.tr_copy_from(&gradient);
+            }
         }
     }
 
     fn linearise(
         &self,
         point: &BeltPoint,
-        multipliers: &[Rows],
-        bounds: &Bounds,
-        into: &mut Linearisation,
+        multipliers: &Multipliers,
+        into: &mut Linearisation<6, 2, 8>,
     ) {
+        let (multipliers, bounds) = (&multipliers.equalities, &multipliers.inequalities);
         into.gradient.fill(NodeVector::zeros());
         self.wrenches(point, multipliers, &mut into.gradient);
         into.chain.first_free = self.free(0);
@@ -591,7 +602,12 @@ impl Program for BeltProgram {
 
 impl BeltProgram {
     /// Derivatives of the elements, block by block; the gradient holds the wrench at every node.
-    fn linearise_elements(&self, point: &BeltPoint, bounds: &Bounds, into: &mut Linearisation) {
+    fn linearise_elements(
+        &self,
+        point: &BeltPoint,
+        bounds: &[f64],
+        into: &mut Linearisation<6, 2, 8>,
+    ) {
         let mut block = Block::default();
         for (pieces, from) in self.pieces.chunks(LANES).zip((0..).step_by(LANES)) {
             for (lane, piece) in pieces.iter().enumerate() {
@@ -628,8 +644,8 @@ impl BeltProgram {
         block: &Block,
         lane: usize,
         point: &BeltPoint,
-        bounds: &Bounds,
-        into: &mut Linearisation,
+        bounds: &[f64],
+        into: &mut Linearisation<6, 2, 8>,
     ) {
         let fields = Self::fields_of(&point.fields, k);
         let (mut gradient, mut controls) = (block.gradient(lane), block.hessian(lane));
@@ -640,13 +656,20 @@ impl BeltProgram {
             controls += curl.hessian;
         }
         let slacks = element.slack_jets(&fields);
-        if !element.strips().has_linear_bounds() {
-            for (slack, multiplier) in slacks.iter().zip(&bounds[k]) {
-                controls -= *multiplier * slack.hessian;
+        let is_linear = element.strips().has_linear_bounds();
+        let rows = into.layout().stage_rows(k);
+        for (row, bound) in rows.zip(element.strips().bounds()) {
+            let slack = &slacks[bound];
+            if !is_linear {
+                controls -= bounds[row] * slack.hessian;
             }
+            into.stage_slacks[row] = halves(&slack.gradient);
         }
-        into.slacks[k] = slacks.map(|slack| slack.gradient);
-        into.diagonal.controls[k] = controls;
+        into.diagonal.controls[k] = StageMatrix {
+            first: controls.fixed_view::<2, 2>(0, 0).into_owned(),
+            mixed: controls.fixed_view::<2, 2>(0, 2).into_owned(),
+            second: controls.fixed_view::<2, 2>(2, 2).into_owned(),
+        };
         block.carry(lane, &mut into.chain.stages[k]);
         for (node, rows) in [(k, 0), (k + 1, 2)] {
             let mut part = into.gradient[node].fixed_rows_mut::<2>(6);
@@ -659,37 +682,43 @@ impl BeltProgram {
         &self,
         k: usize,
         point: &BeltPoint,
-        bounds: &Bounds,
-        into: &mut Linearisation,
+        bounds: &[f64],
+        into: &mut Linearisation<6, 2, 8>,
     ) {
         let Some([_, first, second]) = self.carried_slope(point, k + 1) else {
             return;
         };
         let mut pull = into.gradient[k + 1][7];
-        if let Some(slacks) = into.slacks.get(k + 1) {
-            for (slack, multiplier) in slacks.iter().zip(&bounds[k + 1]) {
-                pull -= multiplier * slack[1];
+        if k + 1 < self.pieces.len() {
+            for row in into.layout().stage_rows(k + 1) {
+                pull -= bounds[row] * into.stage_slacks[row][0][1];
             }
         }
-        into.chain.stages[k].tie = Vector2::new(0.0, first);
-        into.diagonal.controls[k] = Matrix4::zeros();
-        into.diagonal.controls[k][(1, 1)] = second * pull;
+        into.chain.stages[k].tie = [0.0, first];
+        into.diagonal.controls[k] = StageMatrix::zeros();
+        into.diagonal.controls[k].first[(1, 1)] = second * pull;
     }
 
     /// Derivatives of supports, links and loads at their nodes, second ones by their states.
     fn linearise_conditions(
         &self,
         point: &BeltPoint,
-        multipliers: &[Rows],
-        into: &mut Linearisation,
+        multipliers: &[f64],
+        into: &mut Linearisation<6, 2, 8>,
     ) {
-        self.constraint_jacobians(point, &mut into.constraints);
+        self.equality_gradients(point, &mut into.equalities_at);
         for (i, support) in self.supports.iter().enumerate() {
             let pose = &point.poses[support.node];
-            into.diagonal.nodes[i].hessian = support.hessian(pose, &multipliers[i]);
+            *into.equality_hessian(i) = support.hessian(pose, &rows_of(multipliers, i));
         }
-        for (link, rows) in self.links.iter().zip(&mut into.links) {
-            *rows = link.jacobian(point);
+        let rows = into.equalities_between.chunks_exact_mut(ROWS);
+        for (link, rows) in self.links.iter().zip(rows) {
+            let jacobian = link.jacobian(point);
+            for (i, row) in rows.iter_mut().enumerate() {
+                for (row, by_node) in row.iter_mut().zip(&jacobian) {
+                    row.tr_copy_from(&by_node.row(i));
+                }
+            }
         }
         let states = &mut into.diagonal.states;
         states.clear();
@@ -699,8 +728,9 @@ impl BeltProgram {
                 states[node] += load.hessian(&point.poses[node]);
             };
             self.for_each_load(&mut add);
-            for (link, rows) in self.links.iter().zip(&multipliers[self.supports.len()..]) {
-                for (node, hessian) in link.nodes.iter().zip(link.hessians(point, rows)) {
+            for (i, link) in self.links.iter().enumerate() {
+                let rows = rows_of(multipliers, self.supports.len() + i);
+                for (node, hessian) in link.nodes.iter().zip(link.hessians(point, &rows)) {
                     states[*node] += hessian;
                 }
             }
@@ -708,13 +738,18 @@ impl BeltProgram {
     }
 }
 
+/// The two halves of a derivative by the fields at both ends of an element.
+fn halves(by_fields: &Vector4<f64>) -> [Vector2<f64>; 2] {
+    [0, 2].map(|from| by_fields.fixed_rows::<2>(from).into_owned())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::energy::Curl;
-    use crate::solver::{Stationary, lowest_modes};
     use crate::strip::Edge;
     use nalgebra::{DMatrix, DVector, Rotation3, SymmetricEigen};
+    use stagewise::{Stationary, lowest_modes};
 
     fn element(length: f64, geodesic: f64) -> Piece {
         Piece::Strip(Element {
@@ -815,28 +850,39 @@ mod tests {
     }
 
     /// What the solver's linearisation is the second-order expansion of.
-    fn lagrangian(
-        program: &BeltProgram,
-        point: &mut BeltPoint,
-        multipliers: &[Rows],
-        bounds: &Bounds,
-    ) -> f64 {
+    fn lagrangian(program: &BeltProgram, point: &mut BeltPoint, multipliers: &Multipliers) -> f64 {
         let mut values = Values::default();
         assert!(program.evaluate(point, &mut values));
-        let constraints: f64 = values
-            .constraints
-            .iter()
-            .zip(multipliers)
-            .map(|(c, l)| c.dot(l))
-            .sum();
-        let slacks: f64 = values
-            .slacks
-            .iter()
-            .flatten()
-            .zip(bounds.iter().flatten())
-            .map(|(slack, multiplier)| slack * multiplier)
-            .sum();
-        values.objective + constraints - slacks
+        let work = |values: &[f64], multipliers: &[f64]| {
+            let rows = values.iter().zip(multipliers);
+            rows.map(|(value, multiplier)| value * multiplier)
+                .sum::<f64>()
+        };
+        values.objective + work(&values.equalities, &multipliers.equalities)
+            - work(&values.slacks, &multipliers.inequalities)
+    }
+
+    /// Multipliers in general position.
+    fn multipliers(program: &BeltProgram, strength: f64, inequality: f64) -> Multipliers {
+        let layout = program.layout();
+        let equality = |row: usize| {
+            let (block, row) = ((row / ROWS) as f64, (row % ROWS) as f64);
+            strength * (0.7 + 0.6 * block - 0.4 * row)
+        };
+        Multipliers {
+            equalities: (0..layout.equalities()).map(equality).collect(),
+            inequalities: (0..layout.inequalities())
+                .map(|row| inequality * (1.0 + 0.3 * (row % 5) as f64))
+                .collect(),
+        }
+    }
+
+    /// The step along a single unknown, its states carried along.
+    fn unit(linear: &Linearisation<6, 2, 8>, (node, entry): (usize, usize)) -> Vec<NodeVector> {
+        let mut step = vec![NodeVector::zeros(); linear.gradient.len()];
+        step[node][entry] = 1.0;
+        linear.chain.carry(&mut step);
+        step
     }
 
     fn moved(program: &BeltProgram, point: &BeltPoint, steps: &[(usize, usize, f64)]) -> BeltPoint {
@@ -862,19 +908,16 @@ mod tests {
     fn test_gradient_and_hessian_agree_with_finite_differences() {
         let program = program();
         let at = point(&program);
-        let multipliers: Vec<Rows> = (0..5)
-            .map(|k| Rows::from_fn(|i, _| 0.7 + 0.6 * f64::from(k) - 0.4 * i as f64))
-            .collect();
-        let bounds: Bounds = (0..9)
-            .map(|k| [0.3 + 0.1 * f64::from(k), 0.5, 0.2, 0.7, 0.4])
-            .collect();
-        let mut linear = Linearisation::new(&program);
-        program.linearise(&at, &multipliers, &bounds, &mut linear);
+        let multipliers = multipliers(&program, 1.0, 0.4);
+        let layout = program.layout();
+        let mut linear = Linearisation::new(layout.clone());
+        program.linearise(&at, &multipliers, &mut linear);
         let mut gradient = linear.gradient.clone();
-        for (k, slacks) in linear.slacks.iter().enumerate() {
-            for (slack, multiplier) in slacks.iter().zip(bounds[k]) {
-                for (i, by) in (-multiplier * slack).iter().enumerate() {
-                    gradient[k + i / 2][6 + i % 2] += by;
+        for k in 0..layout.stages() {
+            for row in layout.stage_rows(k) {
+                for (end, by) in linear.stage_slacks[row].iter().enumerate() {
+                    let mut part = gradient[k + end].fixed_rows_mut::<2>(6);
+                    part -= multipliers.inequalities[row] * by;
                 }
             }
         }
@@ -883,7 +926,7 @@ mod tests {
         let h = 1e-4;
         let value = |steps: &[(usize, usize, f64)]| {
             let mut point = moved(&program, &at, steps);
-            lagrangian(&program, &mut point, &multipliers, &bounds)
+            lagrangian(&program, &mut point, &multipliers)
         };
         for a in &unknowns {
             let difference = (value(&[(a.0, a.1, h)]) - value(&[(a.0, a.1, -h)])) / (2.0 * h);
@@ -898,7 +941,10 @@ mod tests {
                     - value(&[(a.0, a.1, -h), (b.0, b.1, h)])
                     + value(&[(a.0, a.1, -h), (b.0, b.1, -h)]))
                     / (4.0 * h * h);
-                let exact = linear.chain.second_derivative(&linear.diagonal, *a, *b);
+                let (along_a, along_b) = (unit(&linear, *a), unit(&linear, *b));
+                let exact = linear
+                    .chain
+                    .second_derivative(&linear.diagonal, &along_a, &along_b);
                 assert!(
                     (second - exact).abs() < 2e-5 * exact.abs().max(10.0),
                     "{a:?} {b:?} {second} {exact}"
@@ -912,34 +958,31 @@ mod tests {
         let mut point = at.point.clone();
         let mut values = Values::default();
         assert!(program.evaluate(&mut point, &mut values));
-        let mut linear = Linearisation::new(program);
-        program.linearise(&point, &at.multipliers, &at.bound_multipliers, &mut linear);
+        let layout = program.layout();
+        let mut linear = Linearisation::new(layout.clone());
+        program.linearise(&point, &at.multipliers, &mut linear);
         let unknowns = unknowns(program);
         let steps: Vec<Vec<NodeVector>> = unknowns
             .iter()
-            .map(|(node, entry)| {
-                let mut step = vec![NodeVector::zeros(); program.pieces.len() + 1];
-                step[*node][*entry] = 1.0;
-                linear.chain.carry(&mut step);
-                step
-            })
+            .map(|unknown| unit(&linear, *unknown))
             .collect();
         let count = unknowns.len();
         let square =
             |product: &dyn Fn(usize, usize) -> f64| DMatrix::from_fn(count, count, product);
-        let rate = |k: usize, b: usize, step: &[NodeVector]| {
-            let by = &linear.slacks[k][b];
-            let [first, second] = [k, k + 1].map(|node| &step[node]);
-            by[0] * first[6] + by[1] * first[7] + by[2] * second[6] + by[3] * second[7]
+        let rate = |k: usize, row: usize, step: &[NodeVector]| {
+            let ends = linear.stage_slacks[row].iter().zip(&step[k..]);
+            let rates = ends.map(|(by, node)| by.dot(&node.fixed_rows::<2>(6)));
+            rates.sum::<f64>()
         };
         let second = square(&|i, j| {
             let own = linear
                 .chain
-                .second_derivative(&linear.diagonal, unknowns[i], unknowns[j]);
-            let bounds = (0..program.pieces.len()).flat_map(|k| (0..BOUNDS).map(move |b| (k, b)));
-            let held = bounds.map(|(k, b)| {
-                let stiffness = at.bound_multipliers[k][b] / values.slacks[k][b];
-                stiffness * rate(k, b, &steps[i]) * rate(k, b, &steps[j])
+                .second_derivative(&linear.diagonal, &steps[i], &steps[j]);
+            let stages = 0..layout.stages();
+            let rows = stages.flat_map(|k| layout.stage_rows(k).map(move |row| (k, row)));
+            let held = rows.map(|(k, row)| {
+                let stiffness = at.multipliers.inequalities[row] / values.slacks[row];
+                stiffness * rate(k, row, &steps[i]) * rate(k, row, &steps[j])
             });
             own + held.sum::<f64>()
         });
@@ -950,15 +993,14 @@ mod tests {
             (0..metric.len()).map(of_node).sum()
         });
         let rows_of = |step: &Vec<NodeVector>| {
-            let at_nodes = program.supports.iter().zip(&linear.constraints);
-            let at_nodes = at_nodes.map(|(support, rows)| rows * step[support.node]);
-            let links = program.links.iter().zip(&linear.links);
-            let between = links
-                .map(|(link, rows)| rows[0] * step[link.nodes[0]] + rows[1] * step[link.nodes[1]]);
-            at_nodes
-                .chain(between)
-                .flat_map(|rows| Vec::from(rows.as_slice()))
-                .collect::<Vec<f64>>()
+            let at_nodes = linear.equalities_at.iter().enumerate();
+            let at_nodes = at_nodes.map(|(i, row)| row.dot(&step[program.supports[i / ROWS].node]));
+            let between = linear.equalities_between.iter().enumerate();
+            let between = between.map(|(i, [first, second])| {
+                let [a, b] = program.links[i / ROWS].nodes;
+                first.dot(&step[a]) + second.dot(&step[b])
+            });
+            at_nodes.chain(between).collect::<Vec<f64>>()
         };
         let columns: Vec<_> = steps
             .iter()
@@ -987,14 +1029,10 @@ mod tests {
         let whole = program();
         let supports = whole.supports[..2].to_vec();
         let program = whole.with_supports(supports);
-        let multiplier = |k: usize, i: usize| 0.7 + 0.6 * k as f64 - 0.4 * i as f64;
         for strength in [0.1, 3.0, 30.0] {
             let mut at = Stationary {
                 point: point(&program),
-                multipliers: (0..4)
-                    .map(|k| Rows::from_fn(|i, _| strength * multiplier(k, i)))
-                    .collect(),
-                bound_multipliers: vec![[1e-3; BOUNDS]; 9],
+                multipliers: multipliers(&program, strength, 1e-3),
             };
             let expected = dense_modes(&program, &at);
             let modes = lowest_modes(&program, &mut at, 4).unwrap();

@@ -10,9 +10,9 @@ mod scales;
 mod system;
 
 use crate::equilibrium::{Equilibrium, Status, Wrench};
-use crate::solver::{Kkt, KktVector, Singular};
 use nalgebra::{Matrix3x6, Vector3};
 use scales::Scales;
+use stagewise::{Response, Singular};
 use system::{Direction, System};
 use thiserror::Error;
 
@@ -92,10 +92,13 @@ pub enum NoSensitivity {
     Taut,
 }
 
+/// A vector of the first-order conditions.
+type Step = stagewise::Direction<8>;
+
 /// The factorised first-order conditions of an equilibrium.
 #[derive(Debug)]
 pub struct Sensitivity {
-    kkt: Kkt,
+    response: Response<6, 2, 8>,
     system: System,
     scales: Scales,
     nodes: usize,
@@ -121,9 +124,9 @@ impl Equilibrium {
         if solved.is_flat {
             return Err(NoSensitivity::Flat);
         }
-        let kkt = Kkt::factorise(&solved.program, &mut solved.at.clone());
+        let response = Response::of_minimum(&solved.program, &mut solved.at.clone());
         let mut sensitivity = Sensitivity {
-            kkt: kkt.map_err(|Singular| NoSensitivity::Marginal)?,
+            response: response.map_err(|Singular| NoSensitivity::Marginal)?,
             system: System::new(solved),
             scales: Scales::new(&self.scenario, solved),
             nodes: solved.at.point.poses.len(),
@@ -186,7 +189,7 @@ impl Sensitivity {
     /// [`NoSensitivity::Taut`] where the supports cannot move so.
     pub fn forward(&mut self, parameters: &Parameters) -> Result<Change, NoSensitivity> {
         let direction = self.scales.to_program(parameters, &self.system);
-        let mut right = self.kkt.zero();
+        let mut right = self.response.zero();
         self.system.add_change(&direction, &mut right);
         let solution = self.solve(&right)?;
         let units = self.scales.units;
@@ -226,7 +229,7 @@ impl Sensitivity {
                 rotation: by_reaction.moment * units.energy,
             };
         }
-        let mut right = self.kkt.zero();
+        let mut right = self.response.zero();
         self.system.add_change(&direction, &mut right);
         for k in 0..self.nodes {
             let force = by.position[k] * units.length;
@@ -276,14 +279,14 @@ impl Sensitivity {
     /// that moves nothing either.
     fn is_held(&mut self) -> bool {
         const FAR: f64 = 1e6;
-        let mut right = self.kkt.zero();
+        let mut right = self.response.zero();
         for k in 0..self.nodes {
             let in_general =
                 |seed: f64| Vector3::new(1.0, 2.0, 3.0).map(|i| (i * k as f64 + seed).sin());
             let [force, moment] = [1.0, 2.0].map(|seed| in_general(seed) / self.nodes as f64);
             self.system.add_pull(k, &force, &moment, &mut right.nodes);
         }
-        self.kkt.solve(&right).is_ok_and(|solution| {
+        self.response.solve(&right).is_ok_and(|solution| {
             let motions = (0..self.nodes).map(|k| self.system.motion(k, &solution.nodes));
             motions.fold(0.0, |most, motion| {
                 f64::max(most, motion.translation.amax())
@@ -291,8 +294,8 @@ impl Sensitivity {
         })
     }
 
-    fn solve(&mut self, right: &KktVector) -> Result<KktVector, NoSensitivity> {
-        self.kkt
+    fn solve(&mut self, right: &Step) -> Result<Step, NoSensitivity> {
+        self.response
             .solve(right)
             .map_err(|Singular| NoSensitivity::Taut)
     }

@@ -1,8 +1,9 @@
 //! The second variation of the energy at an equilibrium: whether it is a minimum, and along which motions least so.
 
 use crate::equilibrium::{Equilibrium, Status};
+use crate::program::NodeVector;
 use crate::sensitivity::Motion;
-use crate::solver::{self, Singular};
+use stagewise::Singular;
 use thiserror::Error;
 
 /// What the second variation of the energy says of an equilibrium, on the shapes that its supports and the ribs that are
@@ -76,9 +77,9 @@ impl Equilibrium {
         if self.status != Status::Converged {
             return Err(NoModes::NotConverged);
         }
-        let modes = solver::lowest_modes(&solved.program, &mut solved.at.clone(), count);
+        let modes = stagewise::lowest_modes(&solved.program, &mut solved.at.clone(), count);
         let length = solved.units.length;
-        let of_node = |node: usize, motion: &solver::chain::NodeVector| {
+        let of_node = |node: usize, motion: &NodeVector| {
             let rotation = motion.fixed_rows::<3>(3).into_owned();
             let position = solved.at.point.poses[node].position;
             Motion {
@@ -86,7 +87,7 @@ impl Equilibrium {
                 rotation: rotation / length,
             }
         };
-        let mode = |mode: solver::Mode| {
+        let mode = |mode: stagewise::Mode<8>| {
             let nodes = mode.motion.iter();
             Mode {
                 eigenvalue: mode.eigenvalue * solved.units.energy / length.powi(2),

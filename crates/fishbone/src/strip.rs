@@ -2,7 +2,6 @@
 //!
 //! A strip is known by the rib slope β and by s = β' + κ_g (1+β²): at v it is `1 − v s` times as wide as on the spine.
 
-use crate::solver::BOUNDS;
 use nalgebra::{Matrix2, Vector2};
 use num_dual::{Derivative, Dual2SVec64, DualNum};
 use std::ops::{Div, Mul};
@@ -176,7 +175,9 @@ impl<W: DualNum<Primitive = f64> + Copy> Edge<W> {
 }
 
 /// Most edges that bound ribs besides those of their own stretch.
-pub const FURTHER: usize = BOUNDS - 2;
+pub const FURTHER: usize = 3;
+/// Most inequalities of an element: its own edges, then further ones.
+pub const BOUNDS: usize = 2 + FURTHER;
 
 /// The strips of one element: of half the width, in-plane curvature κ_g, and length.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -227,6 +228,13 @@ impl<W: DualNum<Primitive = f64> + Copy> Strips<W> {
         };
         let [a, b, c] = self.further.each_ref().map(further);
         [-s * plus + 1.0, -s * minus + 1.0, a, b, c]
+    }
+
+    /// The places among [`Self::slacks`] of those that bound something: the stretch's own edges, and further ones that there
+    /// are.
+    pub fn bounds(&self) -> impl Iterator<Item = usize> + use<W> {
+        let further = self.further.each_ref().map(Option::is_some);
+        (0..BOUNDS).filter(move |bound| *bound < 2 || further[bound - 2])
     }
 
     /// Where the rib of this slope meets the edges, v₋ and v₊: `v − κ_g v² (1+β²)/2 = ±V/2 − κ_g V²/8`.

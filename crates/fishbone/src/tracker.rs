@@ -3,12 +3,16 @@
 use crate::equilibrium::{Equilibrium, Status, Units, Wrench, is_settled, of_solution, solve_near};
 use crate::lie::{Pose, exp};
 use crate::path::with_pose;
-use crate::program::{BeltPoint, BeltProgram, Piece};
+use crate::program::{BeltPoint, BeltProgram, Piece, rows_of};
 use crate::scenario::Scenario;
-use crate::solver::{Followed, Follower, Residuals, Shape};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+use stagewise::{Distance, FollowSettings, Followed, Follower, Residuals};
 use std::ops::ControlFlow;
 use thiserror::Error;
+
+/// Distance in U between equilibria up to which a step downhill is no snap: it is that of a rib bound which passes from one
+/// element to the next.
+const SMALLEST_JUMP: f64 = 2e-3;
 
 /// Why an equilibrium cannot be followed.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -53,7 +57,7 @@ pub struct Update {
 pub struct Tracker {
     scenario: Scenario,
     support: usize,
-    follower: Follower<BeltProgram>,
+    follower: Follower<BeltProgram, 6, 2, 8>,
     /// Where the support is, in the units of the programme.
     pose: Pose,
     units: Units,
@@ -82,12 +86,12 @@ impl Tracker {
         let (Some(position), Some(frame), None) = (held.point(), held.frame(), held.hinge) else {
             return Err(NoTracker::NotClamped(support));
         };
-        let follower = Follower::new(
-            solved.program.clone(),
-            scenario.solver.tolerance,
-            &solved.at,
-        )
-        .ok_or(NoTracker::Marginal)?;
+        let settings = FollowSettings {
+            tolerance: scenario.solver.tolerance,
+            smallest_jump: SMALLEST_JUMP,
+        };
+        let follower = Follower::new(solved.program.clone(), settings, &solved.at);
+        let follower = follower.ok_or(NoTracker::Marginal)?;
         let bends = |piece: &Piece| match piece {
             Piece::Strip(element) => element.geodesic != 0.0,
             Piece::Joint { angle } => *angle != 0.0,
@@ -246,10 +250,10 @@ impl Tracker {
     /// If there is no such support.
     pub fn reaction(&self, support: usize) -> Wrench {
         let program = self.follower.program();
-        let rows = &self.follower.multipliers()[support];
+        let rows = rows_of(&self.follower.multipliers().equalities, support);
         let held = &program.supports[support];
         self.units
-            .wrench(held.reaction(&self.point().poses[held.node], rows))
+            .wrench(held.reaction(&self.point().poses[held.node], &rows))
     }
 }
 

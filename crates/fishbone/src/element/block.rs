@@ -8,10 +8,10 @@
 use crate::element::Element;
 use crate::energy::{EnergyModel, Term};
 use crate::lie::{Coefficients, Pose, gauss_points};
-use crate::solver::chain::{NodeVector, Stage};
 use crate::strip::SlopeJet;
 use multiversion::multiversion;
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
+use stagewise::{NodeVector, Stage};
 
 /// Elements in a block.
 pub const LANES: usize = 8;
@@ -159,7 +159,7 @@ impl Block {
         fields: &Vector4<f64>,
         across: &SlopeJet,
         poses: [&Pose; 2],
-        wrench: &NodeVector,
+        wrench: &NodeVector<8>,
     ) {
         let into = &mut self.input;
         let [first, second] = poses;
@@ -206,7 +206,7 @@ impl Block {
     }
 
     /// How the element of a lane carries the twist on.
-    pub fn carry(&self, lane: usize, stage: &mut Stage) {
+    pub fn carry(&self, lane: usize, stage: &mut Stage<2, 8>) {
         let Output { growth, mixed, .. } = &self.output;
         for (column, (growth, mixed)) in growth.iter().zip(mixed).enumerate() {
             let [into_growth, into_mixed] = match column {

@@ -9,10 +9,10 @@ use super::assembly::Assembly;
 use super::search::Search;
 use crate::element::Element;
 use crate::program::{BeltPoint, BeltProgram, Piece};
-use crate::solver::{Outcome, Solution};
 use crate::spine::Spine;
 use crate::strip::{Edge, FURTHER};
 use crate::surface::{crossings, further_edges};
+use stagewise::{Outcome, Solution};
 use std::ops::ControlFlow;
 
 /// Most times that further edges are taken.

@@ -10,11 +10,11 @@ use super::{
 use crate::belt::Belt;
 use crate::guess::{disturb, guess};
 use crate::linking::half_turns;
-use crate::program::{self, BeltPoint, BeltProgram};
+use crate::program::{self, BeltPoint, BeltProgram, ROWS};
 use crate::scenario::{Scenario, SupportSpec};
-use crate::solver::{Inertia, Outcome, Solution, dependent_constraints};
 use crate::stability::Stability;
 use nalgebra::Vector3;
+use stagewise::{Inertia, Outcome, Solution, redundant_equalities};
 use std::ops::ControlFlow;
 
 /// Residual of the constraints, lengths in U and angles in rad, above which they are missed and not only rounded.
@@ -78,9 +78,11 @@ fn equilibrium(
         Status::Converged => half_turns(&spine),
         Status::Infeasible | Status::NotConverged => None,
     };
-    let internal = program.internal(&solution.at.point, &solution.at.multipliers);
+    let internal = program.internal(&solution.at.point, &solution.at.multipliers.equalities);
     let stability = stability(status, solution.inertia, &internal);
-    let links = program.link_forces(&solution.at.multipliers).into_iter();
+    let links = program
+        .link_forces(&solution.at.multipliers.equalities)
+        .into_iter();
     let is_flat = is_flat_under_load(&program, &solution.at.point);
     Equilibrium {
         status,
@@ -196,8 +198,10 @@ fn said_twice(scenario: &Scenario, program: &BeltProgram) -> Option<String> {
         Some(link) if link < links => Some(format!("links[{link}]")),
         _ => None,
     };
-    let dependent = dependent_constraints(program, &general);
-    let names: Vec<_> = dependent.into_iter().filter_map(name).collect();
+    let redundant = redundant_equalities(program, &general);
+    let mut places: Vec<_> = redundant.into_iter().map(|row| row / ROWS).collect();
+    places.dedup();
+    let names: Vec<_> = places.into_iter().filter_map(name).collect();
     (!names.is_empty()).then(|| names.join(" and "))
 }
 
@@ -371,7 +375,7 @@ fn stability(
     let inertia = inertia.filter(|_| status == Status::Converged)?;
     let stress = |(force, moment): &(Vector3<f64>, Vector3<f64>)| force.amax().max(moment.amax());
     let is_stressed = internal.iter().any(|wrench| stress(wrench) > UNSTRESSED);
-    let is_open = inertia.idle > 0 && is_stressed && inertia.negative == 0;
+    let is_open = inertia.cost_free > 0 && is_stressed && inertia.negative == 0;
     (!is_open).then_some(Stability {
         negative_modes: inertia.negative,
         zero_modes: inertia.zero,
@@ -384,7 +388,7 @@ fn reactions(
     solution: &Solution<BeltPoint>,
     units: Units,
 ) -> Vec<Reaction> {
-    let wrenches = program.reactions(&solution.at.point, &solution.at.multipliers);
+    let wrenches = program.reactions(&solution.at.point, &solution.at.multipliers.equalities);
     let supports = scenario.supports.iter().zip(wrenches);
     supports
         .map(|(support, wrench)| Reaction {

@@ -5,9 +5,9 @@ use crate::belt::Belt;
 use crate::lie::{Pose, exp, log};
 use crate::ritz::{self, Options, Orientation, Problem, Side, Solution};
 use crate::scenario::{Scenario, SupportSpec};
-use crate::solver::Residuals;
 use crate::spine::{Piece, Spine};
 use nalgebra::Vector3;
+use stagewise::Residuals;
 use std::ops::ControlFlow;
 
 /// Solves a belt clamped at both ends.

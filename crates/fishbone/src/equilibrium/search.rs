@@ -4,8 +4,8 @@ use crate::energy::EnergyModel;
 use crate::guess::{buckle, disturb, guess, inside, is_flat, ring};
 use crate::program::{BeltPoint, BeltProgram, Piece};
 use crate::scenario::SAME_PLACE;
-use crate::solver::{self, Bounds, Outcome, Settings, Solution};
 use nalgebra::{Vector2, Vector3};
+use stagewise::{Outcome, Program, Settings, Solution};
 use std::f64::consts::PI;
 use std::ops::ControlFlow;
 
@@ -41,7 +41,7 @@ impl Search {
             ..self.settings(COLD)
         };
         let start = guess(program, &self.bulge);
-        solver::minimise(program, &settings, start, &mut || ControlFlow::Continue(()))
+        stagewise::minimise(program, &settings, start, &mut || ControlFlow::Continue(()))
     }
 
     /// Solves on the mesh asked for; by way of a coarse one where there is one, so that refining a mesh does not lead to
@@ -188,7 +188,7 @@ impl Search {
         barrier: f64,
         proceed: &mut Proceed,
     ) -> Solution<BeltPoint> {
-        solver::minimise(program, &self.settings(barrier), start, proceed)
+        stagewise::minimise(program, &self.settings(barrier), start, proceed)
     }
 
     fn settings(&self, barrier: f64) -> Settings {
@@ -255,22 +255,33 @@ pub(super) fn prolong(from: &BeltProgram, point: &BeltPoint, to: &BeltProgram) -
     inside(to, prolonged)
 }
 
-/// The bounds' multipliers on another mesh: those of a stage shared out by length.
-pub(super) fn prolong_bounds(from: &BeltProgram, bounds: &Bounds, to: &BeltProgram) -> Bounds {
+/// The inequalities' multipliers on another mesh: those of a stage shared out by length.
+pub(super) fn prolong_inequalities(
+    from: &BeltProgram,
+    multipliers: &[f64],
+    to: &BeltProgram,
+) -> Vec<f64> {
     let (nodes, known) = (to.nodes(), from.nodes());
-    let stage = |(k, piece): (usize, &Piece)| {
+    let layout = from.layout();
+    let mut prolonged = Vec::new();
+    for (k, element) in to.elements() {
         let middle = 0.5 * (nodes[k] + nodes[k + 1]);
         let parent = known.partition_point(|node| *node <= middle);
         let parent = parent.clamp(1, from.pieces.len()) - 1;
-        let whole = from.pieces[parent].length();
-        let share = if whole > 0.0 {
-            piece.length() / whole
-        } else {
-            1.0
+        let Piece::Strip(whole) = &from.pieces[parent] else {
+            continue;
         };
-        bounds[parent].map(|multiplier| share * multiplier)
-    };
-    to.pieces.iter().enumerate().map(stage).collect()
+        let share = element.length / whole.length;
+        let rows = &multipliers[layout.stage_rows(parent)];
+        let of_bound = |bound: usize| {
+            let mut known = whole.strips().bounds().zip(rows);
+            known
+                .find(|(known, _)| *known == bound)
+                .map_or(0.0, |(_, multiplier)| share * multiplier)
+        };
+        prolonged.extend(element.strips().bounds().map(of_bound));
+    }
+    prolonged
 }
 
 /// The fields at an arc length in U, before or after the jump where there is one.

@@ -1,9 +1,8 @@
 //! What ties two nodes together: the distance between them, Eq. (35), and the seam of a closed belt.
 
-use super::BeltPoint;
 use super::support::RotationGap;
+use super::{BeltPoint, Rows, RowsByNode};
 use crate::lie::{Pose, carried_hessian, hat};
-use crate::solver::{Rows, RowsByNode};
 use nalgebra::{Matrix6, UnitQuaternion, Vector3};
 
 /// Conditions between two nodes.

@@ -1,8 +1,7 @@
 //! What holds a node: positions, frames, hinges, Eq. (35), (36).
 
+use super::{NodeMatrix, Rows, RowsByNode};
 use crate::lie::{Pose, carried_hessian, hat};
-use crate::solver::chain::NodeMatrix;
-use crate::solver::{Rows, RowsByNode};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 /// What of a node's frame is prescribed.

@@ -3,7 +3,6 @@
 use crate::element::Element;
 use crate::energy::{Curl, EnergyModel};
 use crate::lie::gauss_points;
-use crate::solver::BOUNDS;
 use crate::strip::{Across, Edge, Strips};
 use nalgebra::{Matrix4, SVector, Vector2, Vector4};
 use num_dual::{DualNum, HyperDualSVec64, partial_hessian};
@@ -21,17 +20,17 @@ pub(super) struct ByData {
     pub(super) first: Data,
     /// Second ones, by the four unknowns and by the data.
     pub(super) mixed: Matrix4<f64>,
-    /// Derivatives of the slacks by half the width.
-    pub(super) slacks: [f64; BOUNDS],
+    /// Derivatives of the slacks by half the width, of those that bound something.
+    pub(super) slacks: Vec<f64>,
 }
 
 impl ByData {
-    /// At some fields, with the multipliers of the bounds.
+    /// At some fields, with the multipliers of the slacks that bound something.
     pub(super) fn at(
         element: &Element,
         model: EnergyModel,
         fields: &Vector4<f64>,
-        bounds: &[f64; BOUNDS],
+        multipliers: &[f64],
     ) -> Self {
         let [first_rigidity, second_rigidity] = element.rigidity;
         let data = Data::new(
@@ -55,7 +54,9 @@ impl ByData {
                 &SVector::from([element.half_width]),
             ),
         );
-        for ((_, _, by_width, by_both), multiplier) in jets.iter().zip(bounds) {
+        let bounds: Vec<usize> = element.strips().bounds().collect();
+        for (bound, multiplier) in bounds.iter().zip(multipliers) {
+            let (_, _, by_width, by_both) = &jets[*bound];
             first[HALF_WIDTH] -= multiplier * by_width[0];
             mixed[(1, HALF_WIDTH)] -= multiplier * by_both[0];
             mixed[(3, HALF_WIDTH)] -= multiplier * by_both[1];
@@ -63,7 +64,7 @@ impl ByData {
         Self {
             first,
             mixed,
-            slacks: jets.map(|(_, _, by_width, _)| by_width[0]),
+            slacks: bounds.iter().map(|bound| jets[*bound].2[0]).collect(),
         }
     }
 }
@@ -132,7 +133,7 @@ mod tests {
     use super::*;
     use crate::element::block::Block;
     use crate::lie::Pose;
-    use crate::solver::chain::NodeVector;
+    use crate::program::NodeVector;
     use crate::strip::FURTHER;
     use crate::surface::further_edges;
     use crate::surface::samples::{Part, Plan};
@@ -216,7 +217,9 @@ mod tests {
         let line = Edge::line(Vector2::new(0.8, 0.6), 0.03);
         let element = element([None, Some(line), Some(arc)]);
         let fields = Vector4::new(3.0, 0.3, 2.5, 0.36);
-        let bounds = [0.3, 0.5, 0.2, 0.7, 0.4];
+        let bounds = [0.3, 0.5, 0.7, 0.4];
+        let used: Vec<usize> = element.strips().bounds().collect();
+        assert_eq!(used, [0, 1, 3, 4]);
         let with = |entry: usize, by: f64| {
             let mut other = element;
             match entry {
@@ -237,7 +240,8 @@ mod tests {
         ] {
             let lagrangian = |element: &Element| {
                 let (mut value, mut gradient) = energy(element, model, &fields);
-                for (slack, multiplier) in element.slack_jets(&fields).iter().zip(bounds) {
+                let slacks = element.slack_jets(&fields);
+                for (slack, multiplier) in used.iter().map(|bound| &slacks[*bound]).zip(bounds) {
                     value -= multiplier * slack.value;
                     gradient -= multiplier * slack.gradient;
                 }
@@ -254,8 +258,9 @@ mod tests {
                 let error = (mixed - exact.mixed.column(entry)).amax();
                 assert!(error < 1e-6 * mixed.amax().max(1.0), "{model:?} {entry}");
                 if entry == HALF_WIDTH {
-                    let slacks = more.slacks(&fields).into_iter().zip(less.slacks(&fields));
-                    for ((above, below), exact) in slacks.zip(exact.slacks) {
+                    let [above, below] = [&more, &less].map(|element| element.slacks(&fields));
+                    for (bound, exact) in used.iter().zip(&exact.slacks) {
+                        let (above, below) = (above[*bound], below[*bound]);
                         assert!(((above - below) / (2.0 * h) - exact).abs() < 1e-6);
                     }
                 }

@@ -3,7 +3,7 @@
 
 use super::Motion;
 use crate::lie::Pose;
-use crate::solver::chain::NodeVector;
+use crate::program::NodeVector;
 use nalgebra::Vector3;
 
 /// The motion of a node along the step of its state, a twist about the programme's origin.

@@ -4,10 +4,12 @@ use super::Motion;
 use super::data::{ByData, Data, HALF_WIDTH};
 use super::motion::{add_pull, motion};
 use crate::equilibrium::Solved;
-use crate::program::{BeltPoint, BeltProgram, NodeSupport, Piece, Turn, weight};
-use crate::solver::chain::NodeVector;
-use crate::solver::{Bounds, KktVector, Rows};
+use crate::program::{
+    BeltPoint, BeltProgram, NodeSupport, NodeVector, Piece, ROWS, Rows, Turn, rows_of, weight,
+};
 use nalgebra::{Vector3, Vector4};
+use stagewise::{Direction as Step, Program};
+use std::ops::Range;
 
 /// A change of all that a programme is made of, in its units; or a derivative by that.
 #[derive(Debug, Clone)]
@@ -28,18 +30,27 @@ pub(super) struct System {
     multipliers: Vec<Rows>,
     turns: Vec<Turn>,
     elements: Vec<Option<ByData>>,
+    /// Rows of the inequalities of every piece.
+    rows: Vec<Range<usize>>,
 }
 
 impl System {
     pub(super) fn new(solved: &Solved) -> Self {
         let (program, point) = (&solved.program, &solved.at.point);
-        let supports = program.supports.iter().zip(&solved.at.multipliers);
+        let multipliers = &solved.at.multipliers;
+        let supports = program.supports.iter().enumerate();
+        let multipliers_of = |place| rows_of(&multipliers.equalities, place);
+        let layout = program.layout();
+        let rows: Vec<_> = (0..layout.stages())
+            .map(|stage| layout.stage_rows(stage))
+            .collect();
         Self {
             turns: supports
-                .map(|(support, rows)| support.turn(&point.poses[support.node], rows))
+                .map(|(i, support)| support.turn(&point.poses[support.node], &multipliers_of(i)))
                 .collect(),
-            elements: by_data(program, point, &solved.at.bound_multipliers),
-            multipliers: solved.at.multipliers.clone(),
+            elements: by_data(program, point, &rows, &multipliers.inequalities),
+            rows,
+            multipliers: (0..program.supports.len()).map(multipliers_of).collect(),
             program: program.clone(),
             point: point.clone(),
         }
@@ -72,24 +83,28 @@ impl System {
     /// A support's conditions depend on the turn from its frame to the node's alone. Let these turn by q and e: the
     /// turn changes by e − q − ½ q × e, so that the mixed second derivative of multipliers times conditions is that by
     /// e, with the sign changed, and −½ m · (q × e) with their moment m.
-    pub(super) fn add_change(&self, change: &Direction, into: &mut KktVector) {
+    pub(super) fn add_change(&self, change: &Direction, into: &mut Step<8>) {
         for (i, support, turn) in self.supports() {
             let Motion {
                 translation,
                 rotation,
             } = &change.supports[i];
-            let mut position = into.constraints[i].fixed_rows_mut::<3>(0);
-            position -= support.held(translation);
-            let mut frame = into.constraints[i].fixed_rows_mut::<3>(3);
-            frame -= turn.jacobian * rotation;
+            let position = support.held(translation);
+            let frame = turn.jacobian * rotation;
+            let missed = position.iter().chain(&frame);
+            let rows = &mut into.equalities[ROWS * i..ROWS * (i + 1)];
+            for (row, missed) in rows.iter_mut().zip(missed) {
+                *row -= missed;
+            }
             let moment = -turn.hessian * rotation - 0.5 * turn.pull.cross(rotation);
             self.add_pull(support.node, &Vector3::zeros(), &moment, &mut into.nodes);
         }
         for (k, element) in self.elements() {
             let data = &change.elements[k];
             add_fields(k, &(element.mixed * data), &mut into.nodes);
-            for (bound, slack) in into.bounds[k].iter_mut().zip(element.slacks) {
-                *bound += slack * data[HALF_WIDTH];
+            let rows = &mut into.inequalities[self.rows[k].clone()];
+            for (row, slack) in rows.iter_mut().zip(&element.slacks) {
+                *row += slack * data[HALF_WIDTH];
             }
         }
         for (node, force, lever) in self.weights(change.weight) {
@@ -100,10 +115,10 @@ impl System {
 
     /// The derivative by a change of a solution's product with what the change puts on the right-hand side: the
     /// transpose of [`Self::add_change`].
-    pub(super) fn response(&self, solution: &KktVector) -> Direction {
+    pub(super) fn response(&self, solution: &Step<8>) -> Direction {
         let mut response = self.unchanged();
         for (i, support, turn) in self.supports() {
-            let rows = &solution.constraints[i];
+            let rows = rows_of(&solution.equalities, i);
             let rotation = self.motion(support.node, &solution.nodes).rotation;
             response.supports[i] = Motion {
                 translation: -support.held(&rows.fixed_rows::<3>(0).into()),
@@ -114,8 +129,9 @@ impl System {
         for (k, element) in self.elements() {
             let data = &mut response.elements[k];
             *data = element.mixed.tr_mul(&fields(k, &solution.nodes));
-            for (bound, slack) in solution.bounds[k].iter().zip(element.slacks) {
-                data[HALF_WIDTH] += slack * bound;
+            let rows = &solution.inequalities[self.rows[k].clone()];
+            for (row, slack) in rows.iter().zip(&element.slacks) {
+                data[HALF_WIDTH] += slack * row;
             }
         }
         for (node, share, lever) in self.weights(Vector3::repeat(1.0)) {
@@ -193,12 +209,18 @@ impl System {
     }
 }
 
-fn by_data(program: &BeltProgram, point: &BeltPoint, bounds: &Bounds) -> Vec<Option<ByData>> {
+fn by_data(
+    program: &BeltProgram,
+    point: &BeltPoint,
+    rows: &[Range<usize>],
+    multipliers: &[f64],
+) -> Vec<Option<ByData>> {
     let mut by_data: Vec<_> = program.pieces.iter().map(|_| None).collect();
     for (k, element) in program.elements() {
         let [a, b] = [point.fields[k], point.fields[k + 1]];
         let fields = Vector4::new(a[0], a[1], b[0], b[1]);
-        by_data[k] = Some(ByData::at(element, program.model, &fields, &bounds[k]));
+        let multipliers = &multipliers[rows[k].clone()];
+        by_data[k] = Some(ByData::at(element, program.model, &fields, multipliers));
     }
     by_data
 }
