@@ -18,6 +18,7 @@ use crate::strip::{Edge, FURTHER};
 use nalgebra::{Vector2, Vector3};
 use serde::Serialize;
 use std::ops::ControlFlow;
+use thiserror::Error;
 
 /// How a solve ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -94,6 +95,25 @@ pub struct Equilibrium {
     pub(crate) solved: Option<Solved>,
 }
 
+/// Why a result is no equilibrium that more can be computed from: no modes, no derivatives, no continuation.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum Uncertified {
+    /// The method of the solve has no first-order conditions that its result meets.
+    #[error(
+        "the source's method knows no multipliers, so that its result is no equilibrium: use solver.method = \"intrinsic\""
+    )]
+    NoMultipliers,
+    /// The solve has not converged.
+    #[error(
+        "the solve has not converged and leaves nothing to follow or to differentiate: {message}"
+    )]
+    NotConverged {
+        /// How the solve ended.
+        message: String,
+    },
+}
+
 /// A programme and its solution.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Solved {
@@ -131,6 +151,22 @@ impl Units {
 }
 
 impl Equilibrium {
+    /// The programme and its solution, where the solve has converged by a method that knows multipliers: what every
+    /// further computation starts from.
+    ///
+    /// # Errors
+    ///
+    /// [`Uncertified`] otherwise.
+    pub(crate) fn certified(&self) -> Result<&Solved, Uncertified> {
+        let solved = self.solved.as_ref().ok_or(Uncertified::NoMultipliers)?;
+        match self.status {
+            Status::Converged => Ok(solved),
+            Status::Infeasible | Status::NotConverged => Err(Uncertified::NotConverged {
+                message: self.message.clone(),
+            }),
+        }
+    }
+
     /// The longest way in U from a node to the same place of the same belt in another shape.
     pub(crate) fn displacement(&self, other: &Self) -> f64 {
         let length = self.spine.length();

@@ -1,7 +1,7 @@
 //! The equilibria along a path, stable or not: where they fold, where others branch off, and what the belt snaps to.
 
 use crate::equilibrium::{
-    Equilibrium, Mesh, Status, Wrench, excess_distance, is_settled, of_solution,
+    Equilibrium, Mesh, Status, Uncertified, Wrench, excess_distance, is_settled, of_solution,
 };
 use crate::path::Path;
 use crate::program::{BeltPoint, BeltProgram};
@@ -22,12 +22,9 @@ pub use crate::solver::End;
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum NoBranch {
-    /// The method of the solve has no first-order conditions that it meets.
-    #[error("the source's method cannot be followed: use solver.method = \"intrinsic\"")]
-    NoMultipliers,
     /// There is no equilibrium to begin with.
-    #[error("there is nothing to follow: {0}")]
-    NotConverged(String),
+    #[error(transparent)]
+    Uncertified(#[from] Uncertified),
     /// The equilibrium has no single continuation.
     #[error(
         "no single branch could be found to follow: the equilibrium may move at no cost of energy, or the solver cannot go on"
@@ -210,11 +207,7 @@ pub fn follow(
     settings: &Settings,
     proceed: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
 ) -> Result<Diagram, NoBranch> {
-    let solved = equilibrium.solved.as_ref();
-    let solved = solved.ok_or(NoBranch::NoMultipliers)?;
-    if equilibrium.status != Status::Converged {
-        return Err(NoBranch::NotConverged(equilibrium.message.clone()));
-    }
+    let solved = equilibrium.certified()?;
     let mesh = Mesh::of(path.base(), &solved.program);
     let family = Along { path, mesh: &mesh };
     let pace = Pace {

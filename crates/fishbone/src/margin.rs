@@ -1,6 +1,6 @@
 //! How far a support may move before the belt loses its stability.
 
-use crate::equilibrium::{Equilibrium, Mesh, Status, is_settled};
+use crate::equilibrium::{Equilibrium, Mesh, Uncertified, is_settled};
 use crate::follow::{NoBranch, is_taut_beyond};
 use crate::lie::{Pose, exp, log};
 use crate::path::{Motion, Path};
@@ -29,6 +29,9 @@ pub struct Margin {
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum NoMargin {
+    /// There is no equilibrium.
+    #[error(transparent)]
+    Uncertified(#[from] Uncertified),
     /// The equilibrium cannot be followed.
     #[error(transparent)]
     NoBranch(#[from] NoBranch),
@@ -185,7 +188,7 @@ impl Equilibrium {
             let mut values = [[0.0; LOWEST]; 2];
             for (sign, values) in [1.0, -1.0].into_iter().zip(&mut values) {
                 let way = Way::new(self, support, &(sign * Vector6::ith(axis, 1.0)), STEP)?;
-                let solved = self.solved.as_ref().ok_or(NoBranch::NoMultipliers)?;
+                let solved = self.certified()?;
                 let continuation = way.continuation();
                 let modes = continuation
                     .start(&solved.at, way.path.length(), true)
@@ -217,7 +220,7 @@ impl Equilibrium {
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Result<Option<Boundary>, NoMargin> {
         let way = Way::new(self, support, direction, reach)?;
-        let solved = self.solved.as_ref().ok_or(NoBranch::NoMultipliers)?;
+        let solved = self.certified()?;
         let continuation = way.continuation();
         let start = continuation.start(&solved.at, 0.0, true);
         let start = start.ok_or(NoBranch::Singular)?;
@@ -284,10 +287,7 @@ impl Way {
         reach: f64,
     ) -> Result<Self, NoMargin> {
         const LEG: f64 = 3.0;
-        let solved = equilibrium.solved.as_ref().ok_or(NoBranch::NoMultipliers)?;
-        if equilibrium.status != Status::Converged {
-            return Err(NoBranch::NotConverged(equilibrium.message.clone()).into());
-        }
+        let solved = equilibrium.certified()?;
         if equilibrium.stable() != Some(true) {
             return Err(NoMargin::NotStable);
         }

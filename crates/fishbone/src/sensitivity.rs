@@ -9,7 +9,7 @@ mod motion;
 mod scales;
 mod system;
 
-use crate::equilibrium::{Equilibrium, Status, Wrench};
+use crate::equilibrium::{Equilibrium, Uncertified, Wrench};
 use crate::solver::{Kkt, KktVector, Singular};
 use nalgebra::{Matrix3x6, Vector3};
 use scales::Scales;
@@ -63,14 +63,9 @@ pub struct Change {
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum NoSensitivity {
-    /// The method of the solve has no first-order conditions that it meets.
-    #[error(
-        "the source's method knows no multipliers, which derivatives take: use solver.method = \"intrinsic\""
-    )]
-    NoMultipliers,
     /// There is no equilibrium.
-    #[error("the solve has not converged: what it ended with has no derivatives")]
-    NotConverged,
+    #[error(transparent)]
+    Uncertified(#[from] Uncertified),
     /// The shape does not follow from the supports.
     #[error(
         "the belt can move at no cost of energy, so that its supports do not determine the shape, which has no derivatives"
@@ -108,10 +103,7 @@ impl Equilibrium {
     ///
     /// [`NoSensitivity`] unless it is a strict minimum that its supports determine.
     pub fn sensitivity(&self) -> Result<Sensitivity, NoSensitivity> {
-        let solved = self.solved.as_ref().ok_or(NoSensitivity::NoMultipliers)?;
-        if self.status != Status::Converged {
-            return Err(NoSensitivity::NotConverged);
-        }
+        let solved = self.certified()?;
         if let Some(names) = &solved.said_twice {
             return Err(NoSensitivity::HeldTwice(names.clone()));
         }

@@ -1,6 +1,8 @@
 //! Follows an equilibrium at the rate of a robot while one of its supports moves.
 
-use crate::equilibrium::{Equilibrium, Status, Units, Wrench, is_settled, of_solution, solve_near};
+use crate::equilibrium::{
+    Equilibrium, Status, Uncertified, Units, Wrench, is_settled, of_solution, solve_near,
+};
 use crate::lie::{Pose, exp};
 use crate::path::with_pose;
 use crate::program::{BeltPoint, BeltProgram, Piece};
@@ -14,12 +16,9 @@ use thiserror::Error;
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum NoTracker {
-    /// The method of the solve has no first-order conditions that it meets.
-    #[error("the source's method cannot follow: use solver.method = \"intrinsic\"")]
-    NoMultipliers,
     /// There is no equilibrium.
-    #[error("there is nothing to follow: {0}")]
-    NotConverged(String),
+    #[error(transparent)]
+    Uncertified(#[from] Uncertified),
     /// The support does not hold all of a pose.
     #[error(
         "supports[{0}] does not hold a position and a rotation, all of both: nothing can be moved there"
@@ -71,11 +70,7 @@ impl Tracker {
     ///
     /// [`NoTracker`] unless it has converged to a strict minimum and the support holds position and rotation.
     pub fn new(equilibrium: &Equilibrium, support: usize) -> Result<Self, NoTracker> {
-        let solved = equilibrium.solved.as_ref();
-        let solved = solved.ok_or(NoTracker::NoMultipliers)?;
-        if equilibrium.status != Status::Converged {
-            return Err(NoTracker::NotConverged(equilibrium.message.clone()));
-        }
+        let solved = equilibrium.certified()?;
         let scenario = equilibrium.scenario.clone();
         let held = scenario.supports.get(support);
         let held = held.ok_or(NoTracker::NoSupport(support))?;

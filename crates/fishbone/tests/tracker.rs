@@ -1,6 +1,6 @@
 //! Following an equilibrium from Rust: what it costs, and where it leads.
 
-use fishbone::equilibrium::{Equilibrium, Status, solve};
+use fishbone::equilibrium::{Equilibrium, Status, Uncertified, solve};
 use fishbone::scenario::Scenario;
 use fishbone::tracker::{NoTracker, Tracker, Update};
 use nalgebra::Vector3;
@@ -84,7 +84,7 @@ fn test_what_cannot_be_followed_is_refused() {
     let out_of_reach = Tracker::new(&solved(&clamped(1.5)), 1);
     assert!(matches!(
         out_of_reach.err(),
-        Some(NoTracker::NotConverged(_))
+        Some(NoTracker::Uncertified(Uncertified::NotConverged { .. }))
     ));
     let pinned = clamped(0.5).replace(", 0.1], rotation = [0, 0, 0] }", ", 0.1] }");
     assert_eq!(
