@@ -2,6 +2,7 @@
 
 use crate::element::Element;
 use crate::energy::Curl;
+use crate::error::ScenarioError;
 use crate::lie::gauss_points;
 use crate::program::Piece;
 use crate::scenario::{BeltSpec, Rigidity, SAME_PLACE, SegmentSpec};
@@ -176,15 +177,23 @@ impl Segment {
 }
 
 impl Belt {
-    /// The belt of a validated specification; `None` where it lacks a rigidity.
-    pub fn new(spec: &BeltSpec) -> Option<Self> {
-        Some(Self {
+    /// The belt of a specification that [`Scenario::validate`](crate::scenario::Scenario::validate) passes.
+    ///
+    /// # Errors
+    ///
+    /// [`ScenarioError`] where a segment that bends has no rigidity.
+    pub fn new(spec: &BeltSpec) -> Result<Self, ScenarioError> {
+        let segments = spec.segments.iter();
+        let segments: Option<_> = segments
+            .map(|segment| Segment::new(segment, spec))
+            .collect();
+        let no_rigidity = || {
+            let allowed = "given one of rigidity, material, layers";
+            ScenarioError::invalid("belt", "no rigidity", allowed)
+        };
+        Ok(Self {
             width: spec.width,
-            segments: spec
-                .segments
-                .iter()
-                .map(|segment| Segment::new(segment, spec))
-                .collect::<Option<_>>()?,
+            segments: segments.ok_or_else(no_rigidity)?,
             half_turns: spec.closed.then(|| spec.half_turns.unwrap_or(0)),
             density: spec.density_value(),
         })

@@ -10,11 +10,12 @@ mod starts;
 use crate::equilibrium::{
     Equilibrium, Status, is_settled, minimum_from, minimum_next_to, of_solution,
 };
+use crate::problem::Problem;
 use crate::program::{BeltPoint, BeltProgram};
-use crate::scenario::{Method, Scenario};
+use crate::scenario::Method;
 use crate::solver::{self, Mode, Stationary};
 use crate::twins::{SAME, are_twins};
-use nalgebra::{Vector2, Vector3};
+use nalgebra::Vector2;
 use std::ops::ControlFlow;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -49,22 +50,20 @@ pub fn one_by_one(count: usize, task: &(dyn Fn(usize) + Sync)) {
     (0..count).for_each(task);
 }
 
-/// The equilibria of a scenario that [`Scenario::validate`] passes, rising in energy: minima, and saddles with one or two
+/// The equilibria of a problem, rising in energy: minima, and saddles with one or two
 /// negative modes.
 ///
 /// Of shapes that are mirror images of each other the one is told that bulges as the scenario asks. The same input gives the
 /// same output, whatever runs the tasks. Where nothing is found, the one outcome of a solve is told, which says why.
-pub fn branches(scenario: &Scenario, run: &Run, watch: &dyn Watch) -> Vec<Equilibrium> {
+pub fn branches(problem: &Problem, run: &Run, watch: &dyn Watch) -> Vec<Equilibrium> {
     let proceed = &mut || watch.proceed();
-    let first = crate::equilibrium::solve(scenario, proceed);
-    if first.status != Status::Converged || scenario.solver.method != Method::Intrinsic {
-        let is_hopeless = first.status == Status::Infeasible;
-        if is_hopeless || scenario.solver.method != Method::Intrinsic {
-            return vec![first];
-        }
+    let first = crate::equilibrium::solve(problem, proceed);
+    let is_intrinsic = problem.scenario().solver.method == Method::Intrinsic;
+    if first.status == Status::Infeasible || !is_intrinsic {
+        return vec![first];
     }
     let mut census = Census {
-        scenario,
+        problem,
         run,
         watch,
         found: Vec::new(),
@@ -87,7 +86,7 @@ pub fn branches(scenario: &Scenario, run: &Run, watch: &dyn Watch) -> Vec<Equili
 
 /// What has been found so far.
 struct Census<'a> {
-    scenario: &'a Scenario,
+    problem: &'a Problem,
     run: &'a Run<'a>,
     watch: &'a dyn Watch,
     found: Vec<Equilibrium>,
@@ -153,11 +152,11 @@ impl Census<'_> {
 
     /// Minimises from many starts.
     fn start(&mut self) {
-        let scenario = self.scenario;
-        let starts = starts::starts(scenario);
+        let problem = self.problem;
+        let starts = starts::starts(problem);
         let watch = self.watch;
         let found = self.each(&starts, |start| {
-            minimum_from(scenario, start, &mut || watch.proceed())
+            minimum_from(problem, start, &mut || watch.proceed())
         });
         for equilibrium in found {
             self.enter(equilibrium);
@@ -175,10 +174,10 @@ impl Census<'_> {
             if next.is_empty() {
                 return;
             }
-            let (scenario, watch) = (self.scenario, self.watch);
+            let (problem, watch) = (self.problem, self.watch);
             let found = self.each(&next, |minimum| {
                 let modes = lowest_modes(minimum, KICKED_MODES);
-                let kick = |mode: &Mode| kicked_along(scenario, minimum, mode, watch);
+                let kick = |mode: &Mode| kicked_along(problem, minimum, mode, watch);
                 modes.iter().flat_map(kick).collect::<Vec<_>>()
             });
             for equilibrium in found.into_iter().flatten() {
@@ -210,9 +209,9 @@ impl Census<'_> {
                     sided.map(move |(mode, forth)| (equilibrium, mode, forth))
                 })
                 .collect();
-            let (scenario, watch) = (self.scenario, self.watch);
+            let (problem, watch) = (self.problem, self.watch);
             let found = self.each(&tasks, |(equilibrium, mode, forth)| {
-                pushed_over(scenario, equilibrium, mode, *forth, watch)
+                pushed_over(problem, equilibrium, mode, *forth, watch)
             });
             for equilibrium in found.into_iter().flatten() {
                 self.enter(equilibrium);
@@ -278,7 +277,7 @@ fn facing(
             meets.then_some(point)
         });
     let twins = mirrored.filter_map(|point| {
-        let twin = minimum_next_to(&found.scenario, &point, proceed);
+        let twin = minimum_next_to(&found.problem, &point, proceed);
         (twin.status == Status::Converged && is_twin(found, &twin)).then_some(twin)
     });
     let highest = twins.max_by(|a, b| height(a).total_cmp(&height(b)))?;
@@ -290,7 +289,7 @@ fn on_finer_mesh(
     found: &Equilibrium,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Option<Equilibrium> {
-    let fine = found.refined(2 * found.scenario.elements(), proceed)?;
+    let fine = found.refined(2 * found.problem.elements(), proceed)?;
     let is_level = (fine.energy - found.energy).abs() <= LEVEL * size(found);
     (is_level && found.displacement(&fine) <= NEAR).then_some(fine)
 }
@@ -306,7 +305,7 @@ fn lowest_modes(equilibrium: &Equilibrium, count: usize) -> Vec<Mode> {
 
 /// The minima that are found from where one has been displaced far along a mode.
 fn kicked_along(
-    scenario: &Scenario,
+    problem: &Problem,
     from: &Equilibrium,
     mode: &Mode,
     watch: &dyn Watch,
@@ -317,13 +316,13 @@ fn kicked_along(
         FAR.map(|far| solver::moved(&solved.program, &solved.at.point, mode, far))
     });
     starts
-        .map(|start| minimum_from(scenario, &start, &mut || watch.proceed()))
+        .map(|start| minimum_from(problem, &start, &mut || watch.proceed()))
         .collect()
 }
 
 /// The equilibrium that a push leads to and, where that is a saddle, the minima downhill on either side.
 fn pushed_over(
-    scenario: &Scenario,
+    problem: &Problem,
     from: &Equilibrium,
     mode: &Mode,
     forth: bool,
@@ -333,23 +332,23 @@ fn pushed_over(
         return Vec::new();
     };
     let program = &solved.program;
-    let tolerance = scenario.solver.tolerance;
+    let tolerance = problem.tolerance();
     let proceed = &mut |_| watch.proceed();
     let other = solver::pushed_over(program, tolerance, &solved.at, mode, forth, proceed);
     let Some(other) = other else {
         return Vec::new();
     };
-    let mut found = downhill(scenario, program, &other, watch);
-    if is_settled(scenario, program, &other.point) {
+    let mut found = downhill(problem, program, &other, watch);
+    if is_settled(problem, program, &other.point) {
         let solution = solver::assess(program, tolerance, &other);
-        found.push(of_solution(scenario, program.clone(), solution));
+        found.push(of_solution(problem, program.clone(), solution));
     }
     found
 }
 
 /// The minima downhill from a saddle, to either side along its lowest mode.
 fn downhill(
-    scenario: &Scenario,
+    problem: &Problem,
     program: &BeltProgram,
     saddle: &Stationary<BeltPoint>,
     watch: &dyn Watch,
@@ -360,7 +359,7 @@ fn downhill(
     let sides = falling
         .flat_map(|mode| [OFF, -OFF].map(|off| solver::moved(program, &saddle.point, &mode, off)));
     sides
-        .map(|side| minimum_from(scenario, &side, &mut || watch.proceed()))
+        .map(|side| minimum_from(problem, &side, &mut || watch.proceed()))
         .collect()
 }
 
@@ -373,10 +372,7 @@ fn index(equilibrium: &Equilibrium) -> usize {
 /// next to nothing.
 fn size(equilibrium: &Equilibrium) -> f64 {
     const FLAT: f64 = 1e-6;
-    let unit = equilibrium
-        .solved
-        .as_ref()
-        .map_or(0.0, |solved| solved.units.energy);
+    let unit = equilibrium.problem.units().energy;
     equilibrium.elastic_energy.max(FLAT * unit)
 }
 
@@ -407,6 +403,6 @@ const NEAR: f64 = 0.03;
 
 /// How far an equilibrium bulges as its scenario asks.
 fn height(equilibrium: &Equilibrium) -> f64 {
-    let bulge = Vector3::from(equilibrium.scenario.solver.bulge);
+    let bulge = equilibrium.problem.bulge();
     equilibrium.highest_point().position.dot(&bulge.normalize())
 }

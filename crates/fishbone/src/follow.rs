@@ -1,18 +1,16 @@
 //! The equilibria along a path, stable or not: where they fold, where others branch off, and what the belt snaps to.
 
-use crate::equilibrium::{
-    Equilibrium, Mesh, Status, Uncertified, Wrench, excess_distance, is_settled, of_solution,
-};
+use crate::equilibrium::{Equilibrium, Status, Uncertified, is_settled, of_solution};
+use crate::lie::Wrench;
 use crate::path::Path;
+use crate::problem::{Mesh, Problem};
 use crate::program::{BeltPoint, BeltProgram};
-use crate::scenario::Scenario;
 use crate::solver::{
     self, Continuation, Curve, Events, Family, Pace, Residuals, Shape, Station, Stationary, Turn,
 };
 use crate::stability::Stability;
 use crate::surface;
 use crate::twins::{SAME, are_twins};
-use nalgebra::Vector3;
 use std::ops::ControlFlow;
 use thiserror::Error;
 
@@ -171,7 +169,7 @@ pub struct Snapped {
     pub equilibrium: Equilibrium,
 }
 
-/// The programmes of the scenarios along a path, all on the same mesh.
+/// The programmes of the problems along a path, all on the same mesh.
 pub(crate) struct Along<'a> {
     pub(crate) path: &'a Path,
     pub(crate) mesh: &'a Mesh,
@@ -181,8 +179,15 @@ impl Family for Along<'_> {
     type Program = BeltProgram;
 
     fn at(&self, place: f64) -> Option<BeltProgram> {
-        self.mesh.program(&self.path.at(place)?)
+        self.path.at(place)?.program_on(self.mesh)
     }
+}
+
+/// The problem at a place on a path, with its programme on a mesh.
+pub(crate) fn meshed(path: &Path, mesh: &Mesh, place: f64) -> Option<(Problem, BeltProgram)> {
+    let problem = path.at(place)?;
+    let program = problem.program_on(mesh)?;
+    Some((problem, program))
 }
 
 /// Whether the supports are out of the belt's reach next to a place.
@@ -191,10 +196,10 @@ pub(crate) fn is_taut_beyond(path: &Path, place: f64) -> bool {
     const A_LITTLE: f64 = 2e-3;
     let beside = [place - A_LITTLE, place + A_LITTLE].map(|place| path.at(place));
     let mut known = beside.iter().flatten();
-    known.any(|scenario| excess_distance(scenario).is_some())
+    known.any(|problem| problem.unreachable_supports().is_some())
 }
 
-/// Follows an equilibrium of the path's first scenario along the path.
+/// Follows an equilibrium of the path's first problem along the path.
 ///
 /// `proceed` is asked once a step whether to go on, and told the branch and how far along the path it is.
 ///
@@ -215,7 +220,7 @@ pub fn follow(
         stations: settings.states,
         events: Events::Find,
     };
-    let tolerance = path.base().solver.tolerance;
+    let tolerance = path.base().tolerance();
     let continuation = Continuation::new(&family, tolerance, [0.0, path.length()], pace);
     let start = continuation.start(&solved.at, 0.0, true);
     let start = start.ok_or(NoBranch::Singular)?;
@@ -305,11 +310,9 @@ impl Search<'_, '_> {
     fn settled(&self, mut curve: Curve<BeltPoint>) -> Curve<BeltPoint> {
         let Diagram { path, mesh, .. } = &self.diagram;
         let is_unsettled = |station: &Station<BeltPoint>| {
-            let scenario = path.at(station.parameter);
-            let program = scenario.and_then(|s| Some((mesh.program(&s)?, s)));
-            program.is_none_or(|(program, scenario)| {
-                !is_settled(&scenario, &program, &station.at.point)
-            })
+            let meshed = meshed(path, mesh, station.parameter);
+            meshed
+                .is_none_or(|(problem, program)| !is_settled(&problem, &program, &station.at.point))
         };
         if let Some(first) = curve.stations.iter().position(is_unsettled) {
             curve.stations.truncate(first);
@@ -384,8 +387,8 @@ impl Search<'_, '_> {
             diagram: Diagram { path, mesh, .. },
         } = self;
         let branch = self.diagram.branches.len();
-        let program = mesh.program(&path.at(from.parameter)?)?;
-        let tolerance = path.base().solver.tolerance;
+        let program = path.at(from.parameter)?.program_on(mesh)?;
+        let tolerance = path.base().tolerance();
         let mut pushed = |forth| {
             let ask = &mut |_| proceed(branch, from.parameter);
             let at = solver::pushed_over(&program, tolerance, &from.at, mode, forth, ask)?;
@@ -406,7 +409,7 @@ impl Search<'_, '_> {
 
     /// Of two that are mirror images the one that bulges as the scenario asks; else all.
     fn different(&self, stations: Vec<Station<BeltPoint>>) -> Vec<Station<BeltPoint>> {
-        let bulge = Vector3::from(self.diagram.path.base().solver.bulge);
+        let bulge = self.diagram.path.base().bulge();
         let reach = |station: &Station<BeltPoint>| {
             let poses = station.at.point.poses.iter();
             let reach = poses.map(|pose| pose.position.dot(&bulge));
@@ -443,9 +446,8 @@ impl Search<'_, '_> {
         let found = self
             .continuation
             .descend(from, &event.mode, place, proceed)?;
-        let scenario = self.diagram.path.at(place)?;
-        let program = self.diagram.mesh.program(&scenario)?;
-        let equilibrium = of_solution(&scenario, program, found);
+        let (problem, program) = meshed(&self.diagram.path, &self.diagram.mesh, place)?;
+        let equilibrium = of_solution(&problem, program, found);
         let is_converged = equilibrium.status == Status::Converged;
         is_converged.then_some(Snapped { place, equilibrium })
     }
@@ -497,16 +499,16 @@ impl State {
 }
 
 impl Diagram {
-    /// The scenario of a state.
+    /// The problem of a state.
     ///
     /// # Panics
     ///
     /// If there is no such state.
-    pub fn scenario(&self, branch: usize, state: usize) -> Scenario {
+    pub fn problem(&self, branch: usize, state: usize) -> Problem {
         let place = self.branches[branch].states[state].place;
-        let mut scenario = self.path.at(place).expect("it was solved there");
-        scenario.solver.elements = Some(self.path.base().elements());
-        scenario
+        let problem = self.path.at(place);
+        let problem = problem.and_then(|p| p.with_elements(self.path.base().elements()).ok());
+        problem.expect("it was solved there")
     }
 
     /// All that is to be known of a state.
@@ -515,12 +517,12 @@ impl Diagram {
     ///
     /// If there is no such state.
     pub fn equilibrium(&self, branch: usize, state: usize) -> Equilibrium {
-        let scenario = self.scenario(branch, state);
-        let program = self.mesh.program(&scenario);
+        let problem = self.problem(branch, state);
+        let program = problem.program_on(&self.mesh);
         let program = program.expect("it was solved there");
         let at = &self.branches[branch].states[state].at;
-        let solution = solver::assess(&program, scenario.solver.tolerance, at);
-        of_solution(&scenario, program, solution)
+        let solution = solver::assess(&program, problem.tolerance(), at);
+        of_solution(&problem, program, solution)
     }
 
     /// What a report on the path says of a state.
@@ -531,7 +533,7 @@ impl Diagram {
     pub fn summary(&self, branch: usize, state: usize) -> Summary {
         let equilibrium = self.equilibrium(branch, state);
         let spine = &equilibrium.spine;
-        let bulge = Vector3::from(equilibrium.scenario.solver.bulge);
+        let bulge = equilibrium.problem.bulge();
         Summary {
             parameter: self
                 .path

@@ -1,9 +1,10 @@
 //! How far a support may move before the belt loses its stability.
 
-use crate::equilibrium::{Equilibrium, Mesh, Uncertified, is_settled};
-use crate::follow::{NoBranch, is_taut_beyond};
+use crate::equilibrium::{Equilibrium, Uncertified, is_settled};
+use crate::follow::{NoBranch, is_taut_beyond, meshed};
 use crate::lie::{Pose, exp, log};
-use crate::path::{Motion, Path};
+use crate::path::{Motion, NoPath, Path};
+use crate::problem::Mesh;
 use crate::program::{BeltPoint, BeltProgram};
 use crate::solver::{Continuation, End, Events, Family, Pace, Station, Turn};
 use nalgebra::{Vector3, Vector6};
@@ -43,6 +44,9 @@ pub enum NoMargin {
         "supports[{0}] does not hold a position and a rotation, all of both: nothing can be moved there"
     )]
     NotClamped(usize),
+    /// The support may not be moved so far, or not at all.
+    #[error(transparent)]
+    NoPath(#[from] NoPath),
     /// The equilibrium could be followed only so far, stable on the way.
     #[error(
         "the equilibrium could be followed only {0:.3} of the way to `reach`, stable until there: a shorter reach may do"
@@ -291,13 +295,10 @@ impl Way {
         if equilibrium.stable() != Some(true) {
             return Err(NoMargin::NotStable);
         }
-        let scenario = &equilibrium.scenario;
-        let held = scenario.supports.get(support);
-        let held = held.filter(|held| held.hinge.is_none());
-        let held = held.and_then(|held| held.point().zip(held.frame()));
-        let (position, frame) = held.ok_or(NoMargin::NotClamped(support))?;
-        let from = Pose { frame, position };
-        let length = solved.units.length;
+        let problem = &equilibrium.problem;
+        let from = problem.clamp(support);
+        let from = from.ok_or(NoMargin::NotClamped(support))?;
+        let length = problem.units().length;
         let legs = (reach * direction.fixed_rows::<3>(3).norm() / LEG)
             .ceil()
             .max(1.0);
@@ -306,10 +307,10 @@ impl Way {
             (end.position, log(&end.frame))
         });
         let poses: Vec<_> = ends.collect();
-        let path = Path::poses(scenario, support, &poses, Motion::Straight);
+        let path = Path::poses(problem, support, &poses, Motion::Straight);
         Ok(Self {
-            path: path.map_err(|_| NoMargin::NotClamped(support))?,
-            mesh: Mesh::of(scenario, &solved.program),
+            path: path?,
+            mesh: Mesh::of(problem, &solved.program),
             from,
             direction: *direction,
             length,
@@ -327,16 +328,14 @@ impl Way {
             stations: 1000,
             events: Events::EndAtFirst,
         };
-        let tolerance = self.path.base().solver.tolerance;
+        let tolerance = self.path.base().tolerance();
         Continuation::new(self, tolerance, [0.0, self.path.length()], PACE)
     }
 
     /// Whether the ribs are held by the edges that they reach, and by no other.
     fn holds(&self, station: &Station<BeltPoint>) -> bool {
-        let scenario = self.path.at(station.parameter);
-        let program = scenario.and_then(|scenario| Some((self.mesh.program(&scenario)?, scenario)));
-        program
-            .is_some_and(|(program, scenario)| is_settled(&scenario, &program, &station.at.point))
+        let meshed = meshed(&self.path, &self.mesh, station.parameter);
+        meshed.is_some_and(|(problem, program)| is_settled(&problem, &program, &station.at.point))
     }
 }
 
@@ -353,6 +352,6 @@ impl Family for Way {
     type Program = BeltProgram;
 
     fn at(&self, place: f64) -> Option<BeltProgram> {
-        self.mesh.program(&self.path.at(place)?)
+        self.path.at(place)?.program_on(&self.mesh)
     }
 }

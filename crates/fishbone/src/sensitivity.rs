@@ -9,7 +9,8 @@ mod motion;
 mod scales;
 mod system;
 
-use crate::equilibrium::{Equilibrium, Uncertified, Wrench};
+use crate::equilibrium::{Equilibrium, Uncertified};
+use crate::lie::Wrench;
 use crate::solver::{Kkt, KktVector, Singular};
 use nalgebra::{Matrix3x6, Vector3};
 use scales::Scales;
@@ -79,12 +80,12 @@ pub enum NoSensitivity {
     /// The shape is no minimum.
     #[error("the equilibrium is no minimum of the energy: derivatives are of minima only")]
     Saddle,
-    /// Some conditions follow from others.
+    /// Some constraints follow from others.
     #[error("{0} hold the same twice over: they cannot move each by itself")]
-    HeldTwice(String),
-    /// The supports cannot be moved so.
+    Redundant(String),
+    /// The belt is at its inextensible limit, so that the supports cannot move so.
     #[error("the belt between its supports has no slack: they cannot move each by itself")]
-    Taut,
+    NoSlack,
 }
 
 /// The factorised first-order conditions of an equilibrium.
@@ -104,8 +105,8 @@ impl Equilibrium {
     /// [`NoSensitivity`] unless it is a strict minimum that its supports determine.
     pub fn sensitivity(&self) -> Result<Sensitivity, NoSensitivity> {
         let solved = self.certified()?;
-        if let Some(names) = &solved.said_twice {
-            return Err(NoSensitivity::HeldTwice(names.clone()));
+        if let Some(names) = &solved.redundant {
+            return Err(NoSensitivity::Redundant(names.clone()));
         }
         if solved.inertia.is_some_and(|inertia| inertia.negative > 0) {
             return Err(NoSensitivity::Saddle);
@@ -117,7 +118,7 @@ impl Equilibrium {
         let mut sensitivity = Sensitivity {
             kkt: kkt.map_err(|Singular| NoSensitivity::Marginal)?,
             system: System::new(solved),
-            scales: Scales::new(&self.scenario, solved),
+            scales: Scales::new(&self.problem, &solved.program),
             nodes: solved.at.point.poses.len(),
         };
         let is_strict = solved.inertia.is_some_and(|inertia| inertia.zero == 0);
@@ -175,7 +176,7 @@ impl Sensitivity {
     ///
     /// # Errors
     ///
-    /// [`NoSensitivity::Taut`] where the supports cannot move so.
+    /// [`NoSensitivity::NoSlack`] where the supports cannot move so.
     pub fn forward(&mut self, parameters: &Parameters) -> Result<Change, NoSensitivity> {
         let direction = self.scales.to_program(parameters, &self.system);
         let mut right = self.kkt.zero();
@@ -208,7 +209,7 @@ impl Sensitivity {
     ///
     /// # Errors
     ///
-    /// [`NoSensitivity::Taut`] where the supports cannot move each by itself.
+    /// [`NoSensitivity::NoSlack`] where the supports cannot move each by itself.
     pub fn adjoint(&mut self, by: &Change) -> Result<Parameters, NoSensitivity> {
         let units = self.scales.units;
         let mut direction = self.system.unchanged();
@@ -242,7 +243,7 @@ impl Sensitivity {
     ///
     /// # Errors
     ///
-    /// [`NoSensitivity::Taut`] where the support cannot move by itself.
+    /// [`NoSensitivity::NoSlack`] where the support cannot move by itself.
     ///
     /// # Panics
     ///
@@ -286,7 +287,7 @@ impl Sensitivity {
     fn solve(&mut self, right: &KktVector) -> Result<KktVector, NoSensitivity> {
         self.kkt
             .solve(right)
-            .map_err(|Singular| NoSensitivity::Taut)
+            .map_err(|Singular| NoSensitivity::NoSlack)
     }
 }
 

@@ -69,7 +69,8 @@ impl Equilibrium {
     pub fn modes(&self, count: usize) -> Result<Vec<Mode>, NoModes> {
         let solved = self.certified()?;
         let modes = solver::lowest_modes(&solved.program, &mut solved.at.clone(), count);
-        let length = solved.units.length;
+        let units = self.problem.units();
+        let length = units.length;
         let of_node = |node: usize, motion: &solver::chain::NodeVector| {
             let rotation = motion.fixed_rows::<3>(3).into_owned();
             let position = solved.at.point.poses[node].position;
@@ -81,7 +82,7 @@ impl Equilibrium {
         let mode = |mode: solver::Mode| {
             let nodes = mode.motion.iter();
             Mode {
-                eigenvalue: mode.eigenvalue * solved.units.energy / length.powi(2),
+                eigenvalue: mode.eigenvalue * units.energy / length.powi(2),
                 motion: nodes
                     .clone()
                     .enumerate()

@@ -1,14 +1,15 @@
 //! Following an equilibrium from Rust: what it costs, and where it leads.
 
 use fishbone::equilibrium::{Equilibrium, Status, Uncertified, solve};
+use fishbone::problem::Problem;
 use fishbone::scenario::Scenario;
 use fishbone::tracker::{NoTracker, Tracker, Update};
 use nalgebra::Vector3;
 use std::ops::ControlFlow;
 
 fn solved(toml: &str) -> Equilibrium {
-    let scenario = Scenario::from_toml(toml).unwrap();
-    solve(&scenario, &mut || ControlFlow::Continue(()))
+    let problem = Problem::new(Scenario::from_toml(toml).unwrap()).unwrap();
+    solve(&problem, &mut || ControlFlow::Continue(()))
 }
 
 /// A straight belt with its end at (0, y, 0.1).

@@ -5,9 +5,9 @@
 //! the edges that the ribs of the shape found are nearest to crossing at, until none cross and none is held by an edge that it
 //! does not reach.
 
-use super::assembly::Assembly;
 use super::search::Search;
 use crate::element::Element;
+use crate::problem::Problem;
 use crate::program::{BeltPoint, BeltProgram, Piece};
 use crate::solver::{Outcome, Solution};
 use crate::spine::Spine;
@@ -25,21 +25,21 @@ const SAME: f64 = 1e-3;
 /// Goes on from a minimum in which ribs may cross to one in which they do not, and bounds the programme so; with the arc
 /// length where the edges are not settled, if they are not: ribs cross there, or are held by an edge they do not reach.
 pub(super) fn keep_apart(
-    assembly: &Assembly,
+    problem: &Problem,
     search: &Search,
     program: &mut BeltProgram,
     mut solution: Solution<BeltPoint>,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> (Solution<BeltPoint>, Option<f64>) {
     for _ in 0..ROUNDS {
-        let spine = assembly.spine(program, &solution.at.point);
+        let spine = problem.spine(program, &solution.at.point);
         if solution.outcome != Outcome::Converged || unsettled(program, &spine).is_none() {
             return (solution, None);
         }
         take_further_edges(program, &spine);
         solution = search.again(program, solution, proceed);
     }
-    let spine = assembly.spine(program, &solution.at.point);
+    let spine = problem.spine(program, &solution.at.point);
     let unsettled = unsettled(program, &spine).map(|element| spine.u[element]);
     (solution, unsettled)
 }
