@@ -216,10 +216,11 @@ impl Tracker {
         }
     }
 
-    /// The problem with the support elsewhere.
+    /// The problem with the support elsewhere. The programme keeps its origin, also where that is the support that moves.
     fn problem_at(&self, pose: &Pose) -> Result<Problem, ScenarioError> {
         let pose = self.in_scenario(pose);
-        self.problem.with_support_pose(self.support, &pose)
+        let moved = self.problem.with_support_pose(self.support, &pose)?;
+        Ok(moved.about(self.problem.origin()))
     }
 
     /// All that is to be known of the present equilibrium.

@@ -93,3 +93,41 @@ fn test_what_cannot_be_followed_is_refused() {
         Some(NoTracker::NotClamped(1))
     );
 }
+
+#[test]
+fn test_belt_is_where_its_first_support_was_moved_to() {
+    let mut tracker = Tracker::new(&solved(&clamped(0.5)), 0).unwrap();
+    let to = Vector3::new(0.05, -0.02, 0.03);
+    let moved = tracker.update(&to, &Vector3::zeros(), &mut || ControlFlow::Continue(()));
+    assert_eq!(moved.status, Status::Converged);
+    let equilibrium = tracker.equilibrium();
+    assert!((equilibrium.spine.pose[0].position - to).norm() < 1e-9);
+    for (pose, position) in equilibrium.spine.pose.iter().zip(tracker.positions()) {
+        assert!((pose.position - position).norm() < 1e-12);
+    }
+    // What is tracked from there on begins where the belt is.
+    let again = Tracker::new(&equilibrium, 0).unwrap();
+    assert!((again.positions().next().unwrap() - to).norm() < 1e-9);
+}
+
+#[test]
+fn test_pose_that_no_support_may_have_leaves_the_tracker_where_it_was() {
+    let mut tracker = Tracker::new(&solved(&clamped(0.5)), 1).unwrap();
+    let energy = tracker.energy();
+    let (at, level) = (Vector3::new(0.0, 0.5, 0.1), Vector3::zeros());
+    let poses = [
+        (f64::NAN * at, level),
+        (1e9 * at, level),
+        (at, Vector3::new(f64::NAN, 0.0, 0.0)),
+        (at, Vector3::new(0.0, f64::INFINITY, 0.0)),
+    ];
+    for (position, rotation) in poses {
+        let go_on = &mut || ControlFlow::Continue(());
+        let refused = tracker.update(&position, &rotation, go_on);
+        assert_eq!(
+            (refused.status, refused.snapped),
+            (Status::Infeasible, false)
+        );
+        assert_eq!(tracker.energy(), energy);
+    }
+}

@@ -125,6 +125,11 @@ impl Problem {
         self.on_the_same_belt(scenario)
     }
 
+    /// The same problem with the origin of its programmes elsewhere, world axes.
+    pub(crate) fn about(self, origin: Vector3<f64>) -> Self {
+        Self { origin, ..self }
+    }
+
     /// Checks a pose for a support as [`Self::with_support_pose`] does, without making the problem: nothing is allocated.
     pub(crate) fn check_support_pose(
         &self,
@@ -193,7 +198,8 @@ impl Problem {
         self.units
     }
 
-    /// Where the programme has its origin, world axes: at the first support. Units: those of the scenario.
+    /// Where its programmes have their origin, world axes: at the first support, where no other was asked for.
+    /// Units: those of the scenario.
     pub fn origin(&self) -> Vector3<f64> {
         self.origin
     }
