@@ -256,7 +256,7 @@ impl Belt {
 
     /// The same with so many elements to every stretch; `None` where there are not as many stretches.
     pub fn pieces_shared(&self, shares: &[usize], breaks: &[Break]) -> Option<Vec<Piece>> {
-        let length = self.length();
+        let (length, rigidity) = (self.length(), self.mean_rigidity());
         let stretches = self.stretches(breaks);
         if stretches.len() != shares.len() {
             return None;
@@ -265,7 +265,9 @@ impl Belt {
         for (stretch, share) in stretches.iter().zip(shares) {
             pieces.extend(stretch.joint);
             match stretch.segment {
-                Segment::Strip(strip) => pieces.extend(self.elements(strip, stretch, *share)),
+                Segment::Strip(strip) => {
+                    pieces.extend(self.elements(strip, stretch, *share, [length, rigidity]));
+                }
                 Segment::Rigid { .. } | Segment::Corner { .. } => pieces.push(Piece::Rigid {
                     length: (stretch.to - stretch.from) / length,
                 }),
@@ -310,14 +312,14 @@ impl Belt {
         stretches
     }
 
-    /// The elements of one stretch of a strip.
+    /// The elements of one stretch of a strip, in units of length and rigidity.
     fn elements(
         &self,
         strip: &Strip,
         stretch: &Stretch,
         count: usize,
+        [length, rigidity]: [f64; 2],
     ) -> impl Iterator<Item = Piece> {
-        let (length, rigidity) = (self.length(), self.mean_rigidity());
         let (from, step) = (stretch.from, (stretch.to - stretch.from) / count as f64);
         (0..count).map(move |k| {
             let at = |t: f64| strip.rigidity_at(from + (k as f64 + t) * step) / rigidity;

@@ -198,8 +198,8 @@ impl Problem {
         self.units
     }
 
-    /// Where its programmes have their origin, world axes: at the first support, where no other was asked for.
-    /// Units: those of the scenario.
+    /// Where its programmes have their origin, world axes: at the first support, unless a tracker has kept the origin while
+    /// that support moved. Units: those of the scenario.
     pub fn origin(&self) -> Vector3<f64> {
         self.origin
     }
