@@ -190,8 +190,8 @@ pub(crate) fn meshed(path: &Path, mesh: &Mesh, place: f64) -> Option<(Problem, B
     Some((problem, program))
 }
 
-/// Whether the supports are out of the belt's reach next to a place.
-pub(crate) fn is_taut_beyond(path: &Path, place: f64) -> bool {
+/// Whether the supports are out of the belt's reach next to a place, so that the belt is near its inextensible limit.
+pub(crate) fn is_near_limit(path: &Path, place: f64) -> bool {
     /// Of what may be a long way.
     const A_LITTLE: f64 = 2e-3;
     let beside = [place - A_LITTLE, place + A_LITTLE].map(|place| path.at(place));
@@ -201,7 +201,7 @@ pub(crate) fn is_taut_beyond(path: &Path, place: f64) -> bool {
 
 /// Follows an equilibrium of the path's first problem along the path.
 ///
-/// `proceed` is asked once a step whether to go on, and told the branch and how far along the path it is.
+/// `proceed` is asked once a step whether to go on, with the number of the branch and the place on the path.
 ///
 /// # Errors
 ///
@@ -306,7 +306,7 @@ impl Search<'_, '_> {
         }
     }
 
-    /// A curve as far as the ribs are held by the edges that they reach, and no other.
+    /// A curve as far as the ribs are bounded by the edges that they reach, and by no others.
     fn settled(&self, mut curve: Curve<BeltPoint>) -> Curve<BeltPoint> {
         let Diagram { path, mesh, .. } = &self.diagram;
         let is_unsettled = |station: &Station<BeltPoint>| {
@@ -321,7 +321,7 @@ impl Search<'_, '_> {
         }
         let reached = curve.stations.last().map(|station| station.parameter);
         let is_open = matches!(curve.end, End::Event | End::Lost);
-        if is_open && reached.is_some_and(|place| is_taut_beyond(path, place)) {
+        if is_open && reached.is_some_and(|place| is_near_limit(path, place)) {
             // Through the flat belt it would go over into its mirror image.
             curve.events.retain(|(_, event)| event.turn != Turn::Apex);
             curve.end = End::Taut;
@@ -331,24 +331,24 @@ impl Search<'_, '_> {
 
     /// The stations of other branches that cross at an event, a little before it or beyond.
     ///
-    /// From beside the event a push along the mode that is about to vanish leads over to them.
+    /// From beside the event a load along the mode that is about to vanish leads over to them.
     fn crossing(
         &mut self,
         event: &solver::Event<BeltPoint>,
         before: &[Station<BeltPoint>],
     ) -> Vec<Station<BeltPoint>> {
-        /// As near to where a branch is its own mirror image a push off it begins.
+        /// As near to where a branch is its own mirror image a modal load off it begins.
         const BEFORE: [f64; 4] = [5e-3, 1e-3, 2e-2, 2e-4];
         const BESIDE: [f64; 3] = [2e-3, 5e-4, 1e-2];
         /// Farther off it is none that crosses there.
         const NEAR: f64 = 0.2;
         match event.turn {
             Turn::Fold => return Vec::new(),
-            // A push off the branch, where it has not come close yet, leads to the one that it crosses.
+            // A modal load off the branch, where it has not come close yet, leads to the branch that it crosses.
             Turn::Apex => {
                 let mut found = BEFORE.into_iter().map(|far| {
                     let before = before_by(far, event, before);
-                    let others = self.pushed_off(before, &event.mode);
+                    let others = self.beyond_modal_load(before, &event.mode);
                     let is_other = |other: &Station<BeltPoint>| other.negative != before.negative;
                     let others = others.into_iter().flatten().flatten().filter(is_other);
                     others.collect::<Vec<_>>()
@@ -363,7 +363,7 @@ impl Search<'_, '_> {
                 let Some(beside) = self.continuation.beside(event, by) else {
                     continue;
                 };
-                let others = self.pushed_off(&beside, &event.mode);
+                let others = self.beyond_modal_load(&beside, &event.mode);
                 let near =
                     |other: &Station<BeltPoint>| other.at.point.distance(&beside.at.point) < NEAR;
                 found.extend(others.into_iter().flatten().flatten().filter(near));
@@ -375,8 +375,8 @@ impl Search<'_, '_> {
         Vec::new()
     }
 
-    /// The stations on other branches that are reached from one, at its place, by a push along a mode and against it.
-    fn pushed_off(
+    /// The stations on other branches that are reached from a station, at its place, by a load along a mode and against it.
+    fn beyond_modal_load(
         &mut self,
         from: &Station<BeltPoint>,
         mode: &solver::Mode,
@@ -389,12 +389,12 @@ impl Search<'_, '_> {
         let branch = self.diagram.branches.len();
         let program = path.at(from.parameter)?.program_on(mesh)?;
         let tolerance = path.base().tolerance();
-        let mut pushed = |forth| {
+        let mut beyond = |forth| {
             let ask = &mut |_| proceed(branch, from.parameter);
             let at = solver::pushed_over(&program, tolerance, &from.at, mode, forth, ask)?;
             continuation.start(&at, from.parameter, true)
         };
-        Some([pushed(true), pushed(false)])
+        Some([beyond(true), beyond(false)])
     }
 
     /// Which ways to follow a branch from a station beside an event: away from where it crosses, or both where it is the one
@@ -417,11 +417,11 @@ impl Search<'_, '_> {
         };
         let mut different: Vec<Station<BeltPoint>> = Vec::new();
         for station in stations {
-            let is_twin = |other: &&mut Station<BeltPoint>| {
+            let is_image = |other: &&mut Station<BeltPoint>| {
                 are_twins(&other.at.point.poses, &station.at.point.poses, SAME)
             };
-            match different.iter_mut().find(is_twin) {
-                Some(twin) if reach(&station) > reach(twin) => *twin = station,
+            match different.iter_mut().find(is_image) {
+                Some(image) if reach(&station) > reach(image) => *image = station,
                 Some(_) => (),
                 None => different.push(station),
             }

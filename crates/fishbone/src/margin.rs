@@ -1,7 +1,7 @@
 //! How far a support may move before the belt loses its stability.
 
 use crate::equilibrium::{Equilibrium, Uncertified, is_settled};
-use crate::follow::{NoBranch, is_taut_beyond, meshed};
+use crate::follow::{NoBranch, is_near_limit, meshed};
 use crate::lie::{Pose, exp, log};
 use crate::path::{Motion, NoPath, Path};
 use crate::problem::Mesh;
@@ -64,7 +64,7 @@ struct Boundary {
 
 impl Equilibrium {
     /// How far a support may move along a direction before stability is lost; `None` where that is not so within `reach`, and
-    /// where the belt is taut before.
+    /// where the belt comes to its inextensible limit before.
     ///
     /// Directions are displacement in U and rotation left in world axes about the support point; their length does not matter.
     /// `proceed` is asked once a step whether to go on.
@@ -240,13 +240,14 @@ impl Equilibrium {
             .last()
             .map_or(0.0, |station| station.parameter);
         let event = curve.events.first().filter(|(state, _)| *state <= stable);
-        let is_taut = is_taut_beyond(&way.path, last);
-        let Some((_, event)) = event.filter(|(_, event)| event.turn != Turn::Apex || !is_taut)
+        let is_near_limit = is_near_limit(&way.path, last);
+        let Some((_, event)) =
+            event.filter(|(_, event)| event.turn != Turn::Apex || !is_near_limit)
         else {
             let goes_on = stable == curve.stations.len();
             return match curve.end {
                 End::Range | End::Interrupted if goes_on => Ok(None),
-                _ if is_taut => Ok(None),
+                _ if is_near_limit => Ok(None),
                 _ => Err(NoMargin::Lost(last / length)),
             };
         };

@@ -75,8 +75,8 @@ pub enum NoPath {
     Invalid(String),
 }
 
-/// A value that is no number, by its kind where it is long.
-fn told(value: &Value) -> String {
+/// A value that is no number as text; by its kind where that is long.
+fn shown(value: &Value) -> String {
     const SHORT: usize = 40;
     let text = value.to_string();
     match value {
@@ -101,7 +101,7 @@ impl Path {
             let from = found.and_then(Value::as_f64);
             let from = from.ok_or_else(|| NoPath::NoNumber {
                 field: field.clone(),
-                found: found.map_or("nothing".to_owned(), told),
+                found: found.map_or("nothing".to_owned(), shown),
                 example: "supports[1].position[1]".to_owned(),
             })?;
             Ok(Number {

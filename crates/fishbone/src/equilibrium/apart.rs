@@ -15,7 +15,7 @@ use crate::strip::{Edge, FURTHER};
 use crate::surface::{crossings, further_edges};
 use std::ops::ControlFlow;
 
-/// Most times that further edges are taken.
+/// Most times that the active edges are chosen anew.
 const ROUNDS: usize = 20;
 /// An edge at which 1 − s v is below this holds ribs.
 const TOUCHING: f64 = 1e-4;
@@ -36,7 +36,7 @@ pub(super) fn keep_apart(
         if solution.outcome != Outcome::Converged || unsettled(program, &spine).is_none() {
             return (solution, None);
         }
-        take_further_edges(program, &spine);
+        bound_by_edges_beyond(program, &spine);
         solution = search.again(program, solution, proceed);
     }
     let spine = problem.spine(program, &solution.at.point);
@@ -76,7 +76,7 @@ pub(super) fn unsettled(program: &BeltProgram, spine: &Spine) -> Option<usize> {
 }
 
 /// Bounds every element by the edges that its ribs reach past those of their own stretch.
-fn take_further_edges(program: &mut BeltProgram, spine: &Spine) {
+fn bound_by_edges_beyond(program: &mut BeltProgram, spine: &Spine) {
     let scale = 1.0 / spine.length();
     for (k, edges) in further_edges(spine) {
         if let Piece::Strip(element) = &mut program.pieces[k] {
