@@ -18,6 +18,8 @@ use serde::Serialize;
 use std::ops::ControlFlow;
 use thiserror::Error;
 
+pub(crate) use intrinsic::{is_settled, of_solution};
+
 /// How a solve ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -311,5 +313,3 @@ pub(crate) fn minimum_next_to(
 ) -> Equilibrium {
     intrinsic::solve(problem, Start::Close(shape), proceed)
 }
-
-pub(crate) use intrinsic::{is_settled, of_solution};

@@ -1,8 +1,10 @@
 //! The shipped scenarios, solved: the golden cases of every suite.
 
-use fishbone::equilibrium::{Equilibrium, NoShape, Status, solve, solve_from};
+use fishbone::equilibrium::{Equilibrium, NoShape, Status, Uncertified, solve, solve_from};
 use fishbone::problem::Problem;
 use fishbone::scenario::Scenario;
+use fishbone::sensitivity::NoSensitivity;
+use fishbone::stability::NoModes;
 use std::ops::ControlFlow;
 
 fn solved(text: &str) -> Equilibrium {
@@ -168,6 +170,11 @@ fn test_the_sources_own_method_never_calls_its_compromise_converged() {
     );
     assert!(equilibrium.residuals.constraint > 1e-2);
     assert_near(equilibrium.highest_point().position.x, 0.35, 5e-3);
+    let uncertified = Uncertified::NoMultipliers;
+    let modes = equilibrium.modes(1);
+    assert_eq!(modes, Err(NoModes::Uncertified(uncertified.clone())));
+    let derivatives = equilibrium.sensitivity().map(drop);
+    assert_eq!(derivatives, Err(NoSensitivity::Uncertified(uncertified)));
 }
 
 #[test]
