@@ -25,7 +25,7 @@ impl Watch for Counter {
         }
     }
 
-    fn tell(&self, done: usize, planned: usize) {
+    fn report(&self, done: usize, planned: usize) {
         // In this order, so that no more is ever seen done than was planned.
         self.planned.fetch_max(planned, Ordering::SeqCst);
         self.done.fetch_max(done, Ordering::SeqCst);

@@ -4,13 +4,16 @@ use crate::array::{self, Grid, Points, Scalars, Triangles};
 use crate::scenario::Scenario;
 use crate::sensitivity::{Sensitivity, refused};
 use crate::tracker::Tracker;
-use fishbone::equilibrium::{self, Status, Wrench};
+use fishbone::equilibrium::{self, Status};
+use fishbone::lie::Wrench;
+use fishbone::problem::Problem;
 use fishbone::spine::Piece;
 use fishbone::surface::{self, Curve, Rib};
 use nalgebra::{Vector2, Vector3, Vector6};
 use numpy::IntoPyArray;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use std::convert::Infallible;
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
@@ -33,7 +36,8 @@ pub(crate) fn solve(py: Python<'_>, scenario: &Scenario) -> PyResult<Equilibrium
 /// Solves a scenario from a shape with the GIL released: bend and rib slope at equal steps of the arc length.
 ///
 /// Shapes: (m,) both.
-/// Errors: whatever a signal handler raises, `KeyboardInterrupt` first of all.
+/// Errors: `ValueError`, one line, where these are no shape; whatever a signal handler raises, `KeyboardInterrupt` first of
+/// all.
 #[pyfunction]
 pub(crate) fn solve_from(
     py: Python<'_>,
@@ -43,13 +47,13 @@ pub(crate) fn solve_from(
 ) -> PyResult<Equilibrium> {
     let mut signals = Signals::new();
     let found = py.detach(|| {
-        Equilibrium::of(|| {
+        Equilibrium::try_of(|| {
             equilibrium::solve_from(&scenario.0, &bend, &rib_slope, &mut || signals.proceed())
         })
     });
     match signals.raised {
         Some(error) => Err(error),
-        None => Ok(found),
+        None => found.map_err(|error| PyValueError::new_err(error.to_string())),
     }
 }
 
@@ -64,11 +68,8 @@ pub(crate) fn status_name(status: Status) -> &'static str {
 
 impl Equilibrium {
     /// Solves and takes the time.
-    pub(crate) fn timed(
-        scenario: &fishbone::scenario::Scenario,
-        proceed: &mut dyn FnMut() -> ControlFlow<()>,
-    ) -> Self {
-        Self::of(|| equilibrium::solve(scenario, proceed))
+    pub(crate) fn timed(problem: &Problem, proceed: &mut dyn FnMut() -> ControlFlow<()>) -> Self {
+        Self::of(|| equilibrium::solve(problem, proceed))
     }
 
     /// What was found.
@@ -76,19 +77,20 @@ impl Equilibrium {
         &self.solved
     }
 
-    /// What was solved.
-    pub(crate) fn scenario(&self) -> &fishbone::scenario::Scenario {
-        &self.solved.scenario
-    }
-
     /// What is found, with the time that took.
     pub(crate) fn of(find: impl FnOnce() -> equilibrium::Equilibrium) -> Self {
+        let Ok(found) = Self::try_of(|| Ok::<_, Infallible>(find()));
+        found
+    }
+
+    /// The same of what may not be found.
+    fn try_of<E>(find: impl FnOnce() -> Result<equilibrium::Equilibrium, E>) -> Result<Self, E> {
         let start = Instant::now();
-        let solved = find();
-        Self {
+        let solved = find()?;
+        Ok(Self {
             solved,
             solve_time: start.elapsed().as_secs_f64(),
-        }
+        })
     }
 }
 
@@ -172,7 +174,7 @@ impl Equilibrium {
 
     #[getter]
     fn energy_model(&self) -> &'static str {
-        self.solved.scenario.energy.name()
+        self.solved.scenario().energy.name()
     }
 
     /// Units: rad.
@@ -457,7 +459,7 @@ impl Equilibrium {
         match signals.raised {
             Some(error) => Err(error),
             None => Ok(found.map(|solved| {
-                let scenario = Scenario(solved.scenario.clone());
+                let scenario = Scenario(solved.problem().clone());
                 (scenario, Self { solved, solve_time })
             })),
         }

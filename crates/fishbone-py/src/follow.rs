@@ -163,7 +163,7 @@ impl Diagram {
             let [before, after] = event.negative_modes;
             let snapped = event.snapped.as_ref().map(|snapped| {
                 let equilibrium = snapped.equilibrium.clone();
-                let scenario = Scenario(equilibrium.scenario.clone());
+                let scenario = Scenario(equilibrium.problem().clone());
                 let parameter = self.0.path.parameter(snapped.place);
                 (parameter, scenario, Equilibrium::of(|| equilibrium))
             });
@@ -231,7 +231,7 @@ impl Diagram {
     fn equilibrium(&self, py: Python<'_>, branch: usize, state: usize) -> (Scenario, Equilibrium) {
         py.detach(|| {
             let found = Equilibrium::of(|| self.0.equilibrium(branch, state));
-            (Scenario(found.scenario().clone()), found)
+            (Scenario(found.core().problem().clone()), found)
         })
     }
 }

@@ -1,13 +1,14 @@
 //! `_core.Scenario`.
 
 use fishbone::error::ScenarioError;
+use fishbone::problem::Problem;
 use fishbone::scenario;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-/// A checked scenario.
+/// A validated scenario: what is solved.
 #[pyclass(frozen, module = "fishbone._core")]
-pub(crate) struct Scenario(pub(crate) scenario::Scenario);
+pub(crate) struct Scenario(pub(crate) Problem);
 
 #[pymethods]
 impl Scenario {
@@ -29,12 +30,13 @@ impl Scenario {
 
     /// The scenario, normalised, as JSON.
     fn to_json(&self) -> String {
-        self.0.to_json()
+        self.0.scenario().to_json()
     }
 }
 
 fn checked(result: Result<scenario::Scenario, ScenarioError>) -> PyResult<Scenario> {
     result
+        .and_then(Problem::new)
         .map(Scenario)
         .map_err(|error| PyValueError::new_err(error.to_string()))
 }

@@ -1,7 +1,7 @@
 //! `_core.Sensitivity`.
 
 use crate::array::{self, Grid, Points, Scalars};
-use fishbone::equilibrium::Wrench;
+use fishbone::lie::Wrench;
 use fishbone::sensitivity::{self, Change, Motion, NoSensitivity, Parameters};
 use nalgebra::Vector3;
 use numpy::ndarray::{ArrayView1, ArrayView2};

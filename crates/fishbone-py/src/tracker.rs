@@ -65,7 +65,7 @@ impl Tracker {
     fn equilibrium(&self, py: Python<'_>) -> (Scenario, Equilibrium) {
         py.detach(|| {
             let found = Equilibrium::of(|| self.lock().equilibrium());
-            (Scenario(found.scenario().clone()), found)
+            (Scenario(found.core().problem().clone()), found)
         })
     }
 

@@ -2,6 +2,7 @@
 
 use crate::element::Element;
 use crate::energy::Curl;
+use crate::error::ScenarioError;
 use crate::lie::gauss_points;
 use crate::program::Piece;
 use crate::scenario::{BeltSpec, Rigidity, SAME_PLACE, SegmentSpec};
@@ -176,15 +177,23 @@ impl Segment {
 }
 
 impl Belt {
-    /// The belt of a validated specification; `None` where it lacks a rigidity.
-    pub fn new(spec: &BeltSpec) -> Option<Self> {
-        Some(Self {
+    /// The belt of a specification that [`Scenario::validate`](crate::scenario::Scenario::validate) passes.
+    ///
+    /// # Errors
+    ///
+    /// [`ScenarioError`] where a segment that bends has no rigidity.
+    pub fn new(spec: &BeltSpec) -> Result<Self, ScenarioError> {
+        let segments = spec.segments.iter();
+        let segments: Option<_> = segments
+            .map(|segment| Segment::new(segment, spec))
+            .collect();
+        let no_rigidity = || {
+            let allowed = "given one of rigidity, material, layers";
+            ScenarioError::invalid("belt", "no rigidity", allowed)
+        };
+        Ok(Self {
             width: spec.width,
-            segments: spec
-                .segments
-                .iter()
-                .map(|segment| Segment::new(segment, spec))
-                .collect::<Option<_>>()?,
+            segments: segments.ok_or_else(no_rigidity)?,
             half_turns: spec.closed.then(|| spec.half_turns.unwrap_or(0)),
             density: spec.density_value(),
         })
@@ -247,7 +256,7 @@ impl Belt {
 
     /// The same with so many elements to every stretch; `None` where there are not as many stretches.
     pub fn pieces_shared(&self, shares: &[usize], breaks: &[Break]) -> Option<Vec<Piece>> {
-        let length = self.length();
+        let (length, rigidity) = (self.length(), self.mean_rigidity());
         let stretches = self.stretches(breaks);
         if stretches.len() != shares.len() {
             return None;
@@ -256,7 +265,9 @@ impl Belt {
         for (stretch, share) in stretches.iter().zip(shares) {
             pieces.extend(stretch.joint);
             match stretch.segment {
-                Segment::Strip(strip) => pieces.extend(self.elements(strip, stretch, *share)),
+                Segment::Strip(strip) => {
+                    pieces.extend(self.elements(strip, stretch, *share, [length, rigidity]));
+                }
                 Segment::Rigid { .. } | Segment::Corner { .. } => pieces.push(Piece::Rigid {
                     length: (stretch.to - stretch.from) / length,
                 }),
@@ -301,14 +312,14 @@ impl Belt {
         stretches
     }
 
-    /// The elements of one stretch of a strip.
+    /// The elements of one stretch of a strip, in units of length and rigidity.
     fn elements(
         &self,
         strip: &Strip,
         stretch: &Stretch,
         count: usize,
+        [length, rigidity]: [f64; 2],
     ) -> impl Iterator<Item = Piece> {
-        let (length, rigidity) = (self.length(), self.mean_rigidity());
         let (from, step) = (stretch.from, (stretch.to - stretch.from) / count as f64);
         (0..count).map(move |k| {
             let at = |t: f64| strip.rigidity_at(from + (k as f64 + t) * step) / rigidity;

@@ -1,19 +1,21 @@
-//! All equilibria of a scenario that can be found: many starts, then pushes from each that is found to others.
+//! All equilibria of a problem that the search finds: many starts, then perturbations of each minimum and continuation in
+//! modal loads from each equilibrium.
 //!
-//! The starts are arches to either side with waves of bend and of rib slope laid over them, and lead to minima. From each
-//! minimum that is displaced along its lowest modes it is downhill to others. A push along one of the lowest modes of an
-//! equilibrium, followed until it takes none, leads to another, of one index more or less; and from a saddle it is downhill
-//! to both sides.
+//! The starts are arches to either side with waves of bend and of rib slope laid over them, and lead to minima. A minimum
+//! perturbed along its lowest modes leads downhill to other minima. A load along one of the lowest modes of an equilibrium,
+//! continued until it is zero again, leads to another equilibrium, of one negative mode more or less. From a saddle the energy
+//! falls to both sides of its lowest mode.
 
 mod starts;
 
 use crate::equilibrium::{
     Equilibrium, Status, is_settled, minimum_from, minimum_next_to, of_solution,
 };
+use crate::problem::Problem;
 use crate::program::{BeltPoint, BeltProgram};
-use crate::scenario::{Method, Scenario};
+use crate::scenario::Method;
 use crate::twins::{SAME, are_twins};
-use nalgebra::{Vector2, Vector3};
+use nalgebra::Vector2;
 use stagewise::Stationary;
 use std::ops::ControlFlow;
 use std::sync::OnceLock;
@@ -22,29 +24,29 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// A mode of the programme.
 type Mode = stagewise::Mode<8>;
 
-/// Most minima that are kicked.
-const KICKED: usize = 96;
-/// Modes along which a minimum is kicked.
-const KICKED_MODES: usize = 4;
-/// Most equilibria that are pushed.
-const PUSHED: usize = 16;
-/// So many at a time, so that lower ones that are found meanwhile come first.
+/// Most minima that are perturbed.
+const PERTURBED: usize = 96;
+/// Modes along which a minimum is perturbed.
+const PERTURBED_MODES: usize = 4;
+/// Most equilibria that are continued in modal loads.
+const CONTINUED: usize = 16;
+/// Equilibria continued at a time, so that lower ones that are found meanwhile come first.
 const AT_A_TIME: usize = 4;
-/// Most negative modes of what is told.
+/// Most negative modes of an equilibrium that is reported.
 const HIGHEST_INDEX: usize = 2;
-/// Modes along which an equilibrium is pushed, by its number of negative modes.
-const PUSHED_MODES: [usize; HIGHEST_INDEX + 1] = [6, 4, 0];
+/// Modes along which an equilibrium is loaded, by its number of negative modes.
+const LOADED_MODES: [usize; HIGHEST_INDEX + 1] = [6, 4, 0];
 
 /// Runs `task(i)` for every i below a number, in any order and on any thread.
 pub type Run<'a> = dyn Fn(usize, &(dyn Fn(usize) + Sync)) + 'a;
 
-/// What is asked and told while the search goes on, from any thread.
+/// What is asked and reported while the search goes on, from any thread.
 pub trait Watch: Sync {
     /// Whether to go on.
     fn proceed(&self) -> ControlFlow<()>;
 
-    /// So many tasks are done of those that are planned so far.
-    fn tell(&self, done: usize, planned: usize);
+    /// Number of tasks done, and of tasks planned so far.
+    fn report(&self, done: usize, planned: usize);
 }
 
 /// Runs one task after the other on this thread.
@@ -52,22 +54,21 @@ pub fn one_by_one(count: usize, task: &(dyn Fn(usize) + Sync)) {
     (0..count).for_each(task);
 }
 
-/// The equilibria of a scenario that [`Scenario::validate`] passes, rising in energy: minima, and saddles with one or two
+/// The equilibria of a problem, rising in energy: minima, and saddles with one or two
 /// negative modes.
 ///
-/// Of shapes that are mirror images of each other the one is told that bulges as the scenario asks. The same input gives the
-/// same output, whatever runs the tasks. Where nothing is found, the one outcome of a solve is told, which says why.
-pub fn branches(scenario: &Scenario, run: &Run, watch: &dyn Watch) -> Vec<Equilibrium> {
+/// Of shapes that are mirror images of each other the one is reported that bulges as the scenario asks. The same input gives
+/// the same output, whatever runs the tasks. Where nothing is found, the outcome of a solve is reported, whose message gives
+/// the reason.
+pub fn branches(problem: &Problem, run: &Run, watch: &dyn Watch) -> Vec<Equilibrium> {
     let proceed = &mut || watch.proceed();
-    let first = crate::equilibrium::solve(scenario, proceed);
-    if first.status != Status::Converged || scenario.solver.method != Method::Intrinsic {
-        let is_hopeless = first.status == Status::Infeasible;
-        if is_hopeless || scenario.solver.method != Method::Intrinsic {
-            return vec![first];
-        }
+    let first = crate::equilibrium::solve(problem, proceed);
+    let is_intrinsic = problem.scenario().solver.method == Method::Intrinsic;
+    if first.status == Status::Infeasible || !is_intrinsic {
+        return vec![first];
     }
     let mut census = Census {
-        scenario,
+        problem,
         run,
         watch,
         found: Vec::new(),
@@ -76,8 +77,8 @@ pub fn branches(scenario: &Scenario, run: &Run, watch: &dyn Watch) -> Vec<Equili
     };
     census.enter(first.clone());
     census.start();
-    census.kick();
-    census.push();
+    census.perturb();
+    census.load();
     census.confirm();
     census.face();
     let mut found = census.found;
@@ -90,7 +91,7 @@ pub fn branches(scenario: &Scenario, run: &Run, watch: &dyn Watch) -> Vec<Equili
 
 /// What has been found so far.
 struct Census<'a> {
-    scenario: &'a Scenario,
+    problem: &'a Problem,
     run: &'a Run<'a>,
     watch: &'a dyn Watch,
     found: Vec<Equilibrium>,
@@ -111,31 +112,31 @@ impl Census<'_> {
             let filled = slots[i].set(task(&items[i]));
             debug_assert!(filled.is_ok(), "every task runs once");
             let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
-            self.watch.tell(done, self.planned);
+            self.watch.report(done, self.planned);
         });
         slots.into_iter().filter_map(OnceLock::into_inner).collect()
     }
 
-    /// Enters an equilibrium unless it is known or of too many negative modes.
+    /// Enters an equilibrium unless it is known or has too many negative modes; of mirror images the higher.
     fn enter(&mut self, equilibrium: Equilibrium) {
         if equilibrium.status != Status::Converged || index(&equilibrium) > HIGHEST_INDEX {
             return;
         }
-        let twin = self
+        let same = self
             .found
             .iter_mut()
-            .find(|known| is_twin(known, &equilibrium));
-        match twin {
+            .find(|known| is_same(known, &equilibrium));
+        match same {
             None => self.found.push(equilibrium),
-            Some(twin) => {
-                if height(&equilibrium) > height(twin) + 1e-9 * equilibrium.spine.length() {
-                    *twin = equilibrium;
+            Some(known) => {
+                if height(&equilibrium) > height(known) + 1e-9 * equilibrium.spine.length() {
+                    *known = equilibrium;
                 }
             }
         }
     }
 
-    /// The lowest in energy of what `may` be chosen, and is like none that is `known`; these are known from then on.
+    /// The equilibria lowest in energy among those that `may` be chosen and are like none `known`; they are known from then on.
     fn lowest_unlike(
         &self,
         known: &mut Vec<Equilibrium>,
@@ -156,33 +157,33 @@ impl Census<'_> {
 
     /// Minimises from many starts.
     fn start(&mut self) {
-        let scenario = self.scenario;
-        let starts = starts::starts(scenario);
+        let problem = self.problem;
+        let starts = starts::starts(problem);
         let watch = self.watch;
         let found = self.each(&starts, |start| {
-            minimum_from(scenario, start, &mut || watch.proceed())
+            minimum_from(problem, start, &mut || watch.proceed())
         });
         for equilibrium in found {
             self.enter(equilibrium);
         }
     }
 
-    /// Kicks the minima along their lowest modes, the lowest in energy first, and what is found so in turn; of those that
-    /// are alike one.
-    fn kick(&mut self) {
-        let mut kicked = Vec::new();
+    /// Perturbs the minima along their lowest modes, the lowest in energy first, and the minima found so in turn; of minima
+    /// that are alike one.
+    fn perturb(&mut self) {
+        let mut perturbed = Vec::new();
         loop {
             let is_minimum = |e: &Equilibrium| e.stable() == Some(true);
-            let most = KICKED - kicked.len();
-            let next = self.lowest_unlike(&mut kicked, most, is_minimum);
+            let most = PERTURBED - perturbed.len();
+            let next = self.lowest_unlike(&mut perturbed, most, is_minimum);
             if next.is_empty() {
                 return;
             }
-            let (scenario, watch) = (self.scenario, self.watch);
+            let (problem, watch) = (self.problem, self.watch);
             let found = self.each(&next, |minimum| {
-                let modes = lowest_modes(minimum, KICKED_MODES);
-                let kick = |mode: &Mode| kicked_along(scenario, minimum, mode, watch);
-                modes.iter().flat_map(kick).collect::<Vec<_>>()
+                let modes = lowest_modes(minimum, PERTURBED_MODES);
+                let perturb = |mode: &Mode| perturbed_along(problem, minimum, mode, watch);
+                modes.iter().flat_map(perturb).collect::<Vec<_>>()
             });
             for equilibrium in found.into_iter().flatten() {
                 self.enter(equilibrium);
@@ -190,19 +191,19 @@ impl Census<'_> {
         }
     }
 
-    /// Pushes what was found along its lowest modes, the lowest in energy first, and what is found so in turn.
-    fn push(&mut self) {
-        let mut pushed = Vec::new();
+    /// Continues the equilibria in loads along their lowest modes, the lowest in energy first, and those found so in turn.
+    fn load(&mut self) {
+        let mut continued = Vec::new();
         loop {
-            let most = AT_A_TIME.min(PUSHED - pushed.len());
-            let next = self.lowest_unlike(&mut pushed, most, |_| true);
+            let most = AT_A_TIME.min(CONTINUED - continued.len());
+            let next = self.lowest_unlike(&mut continued, most, |_| true);
             if next.is_empty() {
                 return;
             }
             let modes = self.each(&next, |equilibrium| {
                 lowest_modes(
                     equilibrium,
-                    PUSHED_MODES[index(equilibrium).min(HIGHEST_INDEX)],
+                    LOADED_MODES[index(equilibrium).min(HIGHEST_INDEX)],
                 )
             });
             let tasks: Vec<_> = next
@@ -213,9 +214,9 @@ impl Census<'_> {
                     sided.map(move |(mode, forth)| (equilibrium, mode, forth))
                 })
                 .collect();
-            let (scenario, watch) = (self.scenario, self.watch);
+            let (problem, watch) = (self.problem, self.watch);
             let found = self.each(&tasks, |(equilibrium, mode, forth)| {
-                pushed_over(scenario, equilibrium, mode, *forth, watch)
+                beyond_modal_load(problem, equilibrium, mode, *forth, watch)
             });
             for equilibrium in found.into_iter().flatten() {
                 self.enter(equilibrium);
@@ -223,7 +224,7 @@ impl Census<'_> {
         }
     }
 
-    /// Keeps what a mesh twice as fine has too; of those that the mesh does not tell apart the lowest.
+    /// Keeps the equilibria that a mesh twice as fine has too; of equilibria that the mesh does not separate the lowest.
     fn confirm(&mut self) {
         let mut found = std::mem::take(&mut self.found);
         found.sort_by(|a, b| a.energy.total_cmp(&b.energy));
@@ -239,7 +240,7 @@ impl Census<'_> {
             let change = (fine.energy - found.energy).abs();
             let is_known = |(known, own): &(Equilibrium, f64)| {
                 let is_level = (known.energy - fine.energy).abs() <= change.max(*own);
-                is_twin(known, &fine) || (is_level && is_like(known, &fine))
+                is_same(known, &fine) || (is_level && is_like(known, &fine))
             };
             if !known.iter().any(is_known) {
                 known.push((fine, change));
@@ -280,11 +281,11 @@ fn facing(
             let meets = solved.program.miss_of_supports(&point) < ROUNDING;
             meets.then_some(point)
         });
-    let twins = mirrored.filter_map(|point| {
-        let twin = minimum_next_to(&found.scenario, &point, proceed);
-        (twin.status == Status::Converged && is_twin(found, &twin)).then_some(twin)
+    let images = mirrored.filter_map(|point| {
+        let image = minimum_next_to(&found.problem, &point, proceed);
+        (image.status == Status::Converged && is_same(found, &image)).then_some(image)
     });
-    let highest = twins.max_by(|a, b| height(a).total_cmp(&height(b)))?;
+    let highest = images.max_by(|a, b| height(a).total_cmp(&height(b)))?;
     (height(&highest) > height(found) + 1e-9 * found.spine.length()).then_some(highest)
 }
 
@@ -293,7 +294,7 @@ fn on_finer_mesh(
     found: &Equilibrium,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Option<Equilibrium> {
-    let fine = found.refined(2 * found.scenario.elements(), proceed)?;
+    let fine = found.refined(2 * found.problem.elements(), proceed)?;
     let is_level = (fine.energy - found.energy).abs() <= LEVEL * size(found);
     (is_level && found.displacement(&fine) <= NEAR).then_some(fine)
 }
@@ -307,9 +308,9 @@ fn lowest_modes(equilibrium: &Equilibrium, count: usize) -> Vec<Mode> {
     modes.unwrap_or_default()
 }
 
-/// The minima that are found from where one has been displaced far along a mode.
-fn kicked_along(
-    scenario: &Scenario,
+/// The minima that are found from where a minimum has been displaced far along a mode.
+fn perturbed_along(
+    problem: &Problem,
     from: &Equilibrium,
     mode: &Mode,
     watch: &dyn Watch,
@@ -320,13 +321,13 @@ fn kicked_along(
         FAR.map(|far| stagewise::moved(&solved.program, &solved.at.point, mode, far))
     });
     starts
-        .map(|start| minimum_from(scenario, &start, &mut || watch.proceed()))
+        .map(|start| minimum_from(problem, &start, &mut || watch.proceed()))
         .collect()
 }
 
-/// The equilibrium that a push leads to and, where that is a saddle, the minima downhill on either side.
-fn pushed_over(
-    scenario: &Scenario,
+/// The equilibrium that a modal load leads to and, where that is a saddle, the minima downhill on either side.
+fn beyond_modal_load(
+    problem: &Problem,
     from: &Equilibrium,
     mode: &Mode,
     forth: bool,
@@ -336,23 +337,23 @@ fn pushed_over(
         return Vec::new();
     };
     let program = &solved.program;
-    let tolerance = scenario.solver.tolerance;
+    let tolerance = problem.tolerance();
     let proceed = &mut |_| watch.proceed();
     let other = stagewise::over_modal_load(program, tolerance, &solved.at, mode, forth, proceed);
     let Some(other) = other else {
         return Vec::new();
     };
-    let mut found = downhill(scenario, program, &other, watch);
-    if is_settled(scenario, program, &other.point) {
+    let mut found = downhill(problem, program, &other, watch);
+    if is_settled(problem, program, &other.point) {
         let solution = stagewise::assess(program, tolerance, &other);
-        found.push(of_solution(scenario, program.clone(), solution));
+        found.push(of_solution(problem, program.clone(), solution));
     }
     found
 }
 
 /// The minima downhill from a saddle, to either side along its lowest mode.
 fn downhill(
-    scenario: &Scenario,
+    problem: &Problem,
     program: &BeltProgram,
     saddle: &Stationary<BeltPoint>,
     watch: &dyn Watch,
@@ -364,7 +365,7 @@ fn downhill(
         [OFF, -OFF].map(|off| stagewise::moved(program, &saddle.point, &mode, off))
     });
     sides
-        .map(|side| minimum_from(scenario, &side, &mut || watch.proceed()))
+        .map(|side| minimum_from(problem, &side, &mut || watch.proceed()))
         .collect()
 }
 
@@ -377,25 +378,22 @@ fn index(equilibrium: &Equilibrium) -> usize {
 /// next to nothing.
 fn size(equilibrium: &Equilibrium) -> f64 {
     const FLAT: f64 = 1e-6;
-    let unit = equilibrium
-        .solved
-        .as_ref()
-        .map_or(0.0, |solved| solved.units.energy);
+    let unit = equilibrium.problem.units().energy;
     equilibrium.elastic_energy.max(FLAT * unit)
 }
 
-/// Whether two are the same.
-fn is_twin(a: &Equilibrium, b: &Equilibrium) -> bool {
+/// Whether two equilibria are the same but for a symmetry.
+fn is_same(a: &Equilibrium, b: &Equilibrium) -> bool {
     const SAME_LEVEL: f64 = 1e-4;
     is_within(a, b, SAME_LEVEL, SAME)
 }
 
-/// Whether two may be the same but for the mesh.
+/// Whether two equilibria may be the same but for a symmetry and the mesh.
 fn is_like(a: &Equilibrium, b: &Equilibrium) -> bool {
     is_within(a, b, LEVEL, NEAR)
 }
 
-/// Whether two differ by no more than a share of the energy and a distance in U, and in no number of negative modes.
+/// Whether two equilibria differ by no more than a share of the energy and a distance in U, and in no number of negative modes.
 fn is_within(a: &Equilibrium, b: &Equilibrium, share: f64, distance: f64) -> bool {
     let solved = || Some((a.solved.as_ref()?, b.solved.as_ref()?));
     let is_level = (a.energy - b.energy).abs() <= share * size(a).max(size(b));
@@ -411,6 +409,6 @@ const NEAR: f64 = 0.03;
 
 /// How far an equilibrium bulges as its scenario asks.
 fn height(equilibrium: &Equilibrium) -> f64 {
-    let bulge = Vector3::from(equilibrium.scenario.solver.bulge);
+    let bulge = equilibrium.problem.bulge();
     equilibrium.highest_point().position.dot(&bulge.normalize())
 }

@@ -1,15 +1,13 @@
 //! The equilibria along a path, stable or not: where they fold, where others branch off, and what the belt snaps to.
 
-use crate::equilibrium::{
-    Equilibrium, Mesh, Status, Wrench, excess_distance, is_settled, of_solution,
-};
+use crate::equilibrium::{Equilibrium, Status, Uncertified, is_settled, of_solution};
+use crate::lie::Wrench;
 use crate::path::Path;
+use crate::problem::{Mesh, Problem};
 use crate::program::{BeltPoint, BeltProgram};
-use crate::scenario::Scenario;
 use crate::stability::Stability;
 use crate::surface;
 use crate::twins::{SAME, are_twins};
-use nalgebra::Vector3;
 use stagewise::{Continuation, Distance, Events, Family, Pace, Residuals, Stationary, Turn};
 use std::ops::ControlFlow;
 use thiserror::Error;
@@ -59,12 +57,9 @@ impl From<stagewise::End<()>> for End {
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum NoBranch {
-    /// The method of the solve has no first-order conditions that it meets.
-    #[error("the source's method cannot be followed: use solver.method = \"intrinsic\"")]
-    NoMultipliers,
     /// There is no equilibrium to begin with.
-    #[error("there is nothing to follow: {0}")]
-    NotConverged(String),
+    #[error(transparent)]
+    Uncertified(#[from] Uncertified),
     /// The equilibrium has no single continuation.
     #[error(
         "no single branch could be found to follow: the equilibrium may move at no cost of energy, or the solver cannot go on"
@@ -211,7 +206,7 @@ pub struct Snapped {
     pub equilibrium: Equilibrium,
 }
 
-/// The programmes of the scenarios along a path, all on the same mesh.
+/// The programmes of the problems along a path, all on the same mesh.
 pub(crate) struct Along<'a> {
     pub(crate) path: &'a Path,
     pub(crate) mesh: &'a Mesh,
@@ -222,22 +217,29 @@ impl Family<6, 2, 8> for Along<'_> {
     type Program = BeltProgram;
 
     fn at(&self, place: f64) -> Option<BeltProgram> {
-        self.mesh.program(&self.path.at(place)?)
+        self.path.at(place)?.program_on(self.mesh)
     }
 }
 
-/// Whether the supports are out of the belt's reach next to a place.
-pub(crate) fn is_taut_beyond(path: &Path, place: f64) -> bool {
+/// The problem at a place on a path, with its programme on a mesh.
+pub(crate) fn meshed(path: &Path, mesh: &Mesh, place: f64) -> Option<(Problem, BeltProgram)> {
+    let problem = path.at(place)?;
+    let program = problem.program_on(mesh)?;
+    Some((problem, program))
+}
+
+/// Whether the supports are out of the belt's reach next to a place, so that the belt is near its inextensible limit.
+pub(crate) fn is_near_limit(path: &Path, place: f64) -> bool {
     /// Of what may be a long way.
     const A_LITTLE: f64 = 2e-3;
     let beside = [place - A_LITTLE, place + A_LITTLE].map(|place| path.at(place));
     let mut known = beside.iter().flatten();
-    known.any(|scenario| excess_distance(scenario).is_some())
+    known.any(|problem| problem.unreachable_supports().is_some())
 }
 
-/// Follows an equilibrium of the path's first scenario along the path.
+/// Follows an equilibrium of the path's first problem along the path.
 ///
-/// `proceed` is asked once a step whether to go on, and told the branch and how far along the path it is.
+/// `proceed` is asked once a step whether to go on, with the number of the branch and the place on the path.
 ///
 /// # Errors
 ///
@@ -248,11 +250,7 @@ pub fn follow(
     settings: &Settings,
     proceed: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
 ) -> Result<Diagram, NoBranch> {
-    let solved = equilibrium.solved.as_ref();
-    let solved = solved.ok_or(NoBranch::NoMultipliers)?;
-    if equilibrium.status != Status::Converged {
-        return Err(NoBranch::NotConverged(equilibrium.message.clone()));
-    }
+    let solved = equilibrium.certified()?;
     let mesh = Mesh::of(path.base(), &solved.program);
     let family = Along { path, mesh: &mesh };
     let pace = Pace {
@@ -260,7 +258,7 @@ pub fn follow(
         stations: settings.states,
         events: Events::Find,
     };
-    let tolerance = path.base().solver.tolerance;
+    let tolerance = path.base().tolerance();
     let continuation = Continuation::new(&family, tolerance, [0.0, path.length()], pace);
     let start = continuation.start(&solved.at, 0.0, true);
     let start = start.ok_or(NoBranch::Singular)?;
@@ -347,16 +345,14 @@ impl Search<'_, '_> {
         }
     }
 
-    /// A curve as far as the ribs are held by the edges that they reach, and no other.
+    /// A curve as far as the ribs are bounded by the edges that they reach, and by no others.
     fn settled(&self, mut curve: Curve) -> (Curve, End) {
         let mut end = End::from(curve.end);
         let Diagram { path, mesh, .. } = &self.diagram;
         let is_unsettled = |station: &Station| {
-            let scenario = path.at(station.parameter);
-            let program = scenario.and_then(|s| Some((mesh.program(&s)?, s)));
-            program.is_none_or(|(program, scenario)| {
-                !is_settled(&scenario, &program, &station.at.point)
-            })
+            let meshed = meshed(path, mesh, station.parameter);
+            meshed
+                .is_none_or(|(problem, program)| !is_settled(&problem, &program, &station.at.point))
         };
         if let Some(first) = curve.stations.iter().position(is_unsettled) {
             curve.stations.truncate(first);
@@ -365,7 +361,7 @@ impl Search<'_, '_> {
         }
         let reached = curve.stations.last().map(|station| station.parameter);
         let is_open = matches!(end, End::Event | End::Lost);
-        if is_open && reached.is_some_and(|place| is_taut_beyond(path, place)) {
+        if is_open && reached.is_some_and(|place| is_near_limit(path, place)) {
             // Through the flat belt it would go over into its mirror image.
             curve.events.retain(|(_, event)| event.turn != Turn::Apex);
             end = End::Taut;
@@ -375,20 +371,20 @@ impl Search<'_, '_> {
 
     /// The stations of other branches that cross at an event, a little before it or beyond.
     ///
-    /// From beside the event a push along the mode that is about to vanish leads over to them.
+    /// From beside the event a load along the mode that is about to vanish leads over to them.
     fn crossing(&mut self, event: &Crossing, before: &[Station]) -> Vec<Station> {
-        /// As near to where a branch is its own mirror image a push off it begins.
+        /// As near to where a branch is its own mirror image a modal load off it begins.
         const BEFORE: [f64; 4] = [5e-3, 1e-3, 2e-2, 2e-4];
         const BESIDE: [f64; 3] = [2e-3, 5e-4, 1e-2];
         /// Farther off it is none that crosses there.
         const NEAR: f64 = 0.2;
         match event.turn {
             Turn::Fold => return Vec::new(),
-            // A push off the branch, where it has not come close yet, leads to the one that it crosses.
+            // A modal load off the branch, where it has not come close yet, leads to the branch that it crosses.
             Turn::Apex => {
                 let mut found = BEFORE.into_iter().map(|far| {
                     let before = before_by(far, event, before);
-                    let others = self.pushed_off(before, &event.mode);
+                    let others = self.beyond_modal_load(before, &event.mode);
                     let is_other = |other: &Station| other.negative != before.negative;
                     let others = others.into_iter().flatten().flatten().filter(is_other);
                     others.collect::<Vec<_>>()
@@ -403,7 +399,7 @@ impl Search<'_, '_> {
                 let Some(beside) = self.continuation.beside(event, by) else {
                     continue;
                 };
-                let others = self.pushed_off(&beside, &event.mode);
+                let others = self.beyond_modal_load(&beside, &event.mode);
                 let near = |other: &Station| other.at.point.distance(&beside.at.point) < NEAR;
                 found.extend(others.into_iter().flatten().flatten().filter(near));
             }
@@ -414,8 +410,8 @@ impl Search<'_, '_> {
         Vec::new()
     }
 
-    /// The stations on other branches that are reached from one, at its place, by a push along a mode and against it.
-    fn pushed_off(
+    /// The stations on other branches that are reached from a station, at its place, by a load along a mode and against it.
+    fn beyond_modal_load(
         &mut self,
         from: &Station,
         mode: &stagewise::Mode<8>,
@@ -426,14 +422,14 @@ impl Search<'_, '_> {
             diagram: Diagram { path, mesh, .. },
         } = self;
         let branch = self.diagram.branches.len();
-        let program = mesh.program(&path.at(from.parameter)?)?;
-        let tolerance = path.base().solver.tolerance;
-        let mut pushed = |forth| {
+        let program = path.at(from.parameter)?.program_on(mesh)?;
+        let tolerance = path.base().tolerance();
+        let mut beyond = |forth| {
             let ask = &mut |_| proceed(branch, from.parameter);
             let at = stagewise::over_modal_load(&program, tolerance, &from.at, mode, forth, ask)?;
             continuation.start(&at, from.parameter, true)
         };
-        Some([pushed(true), pushed(false)])
+        Some([beyond(true), beyond(false)])
     }
 
     /// Which ways to follow a branch from a station beside an event: away from where it crosses, or both where it is the one
@@ -448,7 +444,7 @@ impl Search<'_, '_> {
 
     /// Of two that are mirror images the one that bulges as the scenario asks; else all.
     fn different(&self, stations: Vec<Station>) -> Vec<Station> {
-        let bulge = Vector3::from(self.diagram.path.base().solver.bulge);
+        let bulge = self.diagram.path.base().bulge();
         let reach = |station: &Station| {
             let poses = station.at.point.poses.iter();
             let reach = poses.map(|pose| pose.position.dot(&bulge));
@@ -456,11 +452,11 @@ impl Search<'_, '_> {
         };
         let mut different: Vec<Station> = Vec::new();
         for station in stations {
-            let is_twin = |other: &&mut Station| {
+            let is_image = |other: &&mut Station| {
                 are_twins(&other.at.point.poses, &station.at.point.poses, SAME)
             };
-            match different.iter_mut().find(is_twin) {
-                Some(twin) if reach(&station) > reach(twin) => *twin = station,
+            match different.iter_mut().find(is_image) {
+                Some(image) if reach(&station) > reach(image) => *image = station,
                 Some(_) => (),
                 None => different.push(station),
             }
@@ -480,9 +476,8 @@ impl Search<'_, '_> {
         let found = self
             .continuation
             .descend(from, &event.mode, place, proceed)?;
-        let scenario = self.diagram.path.at(place)?;
-        let program = self.diagram.mesh.program(&scenario)?;
-        let equilibrium = of_solution(&scenario, program, found);
+        let (problem, program) = meshed(&self.diagram.path, &self.diagram.mesh, place)?;
+        let equilibrium = of_solution(&problem, program, found);
         let is_converged = equilibrium.status == Status::Converged;
         is_converged.then_some(Snapped { place, equilibrium })
     }
@@ -529,16 +524,16 @@ impl State {
 }
 
 impl Diagram {
-    /// The scenario of a state.
+    /// The problem of a state.
     ///
     /// # Panics
     ///
     /// If there is no such state.
-    pub fn scenario(&self, branch: usize, state: usize) -> Scenario {
+    pub fn problem(&self, branch: usize, state: usize) -> Problem {
         let place = self.branches[branch].states[state].place;
-        let mut scenario = self.path.at(place).expect("it was solved there");
-        scenario.solver.elements = Some(self.path.base().elements());
-        scenario
+        let problem = self.path.at(place);
+        let problem = problem.and_then(|p| p.with_elements(self.path.base().elements()).ok());
+        problem.expect("it was solved there")
     }
 
     /// All that is to be known of a state.
@@ -547,12 +542,12 @@ impl Diagram {
     ///
     /// If there is no such state.
     pub fn equilibrium(&self, branch: usize, state: usize) -> Equilibrium {
-        let scenario = self.scenario(branch, state);
-        let program = self.mesh.program(&scenario);
+        let problem = self.problem(branch, state);
+        let program = problem.program_on(&self.mesh);
         let program = program.expect("it was solved there");
         let at = &self.branches[branch].states[state].at;
-        let solution = stagewise::assess(&program, scenario.solver.tolerance, at);
-        of_solution(&scenario, program, solution)
+        let solution = stagewise::assess(&program, problem.tolerance(), at);
+        of_solution(&problem, program, solution)
     }
 
     /// What a report on the path says of a state.
@@ -563,7 +558,7 @@ impl Diagram {
     pub fn summary(&self, branch: usize, state: usize) -> Summary {
         let equilibrium = self.equilibrium(branch, state);
         let spine = &equilibrium.spine;
-        let bulge = Vector3::from(equilibrium.scenario.solver.bulge);
+        let bulge = equilibrium.problem.bulge();
         Summary {
             parameter: self
                 .path

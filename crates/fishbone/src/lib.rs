@@ -2,13 +2,13 @@
 //!
 //! A belt is described by its centre line (the *spine*) and the straight lines across it (the *ribs*); its
 //! shape is the least bending energy under the poses of its supports. One direction of flow:
-//! [`scenario`] → [`belt`] → [`program`] → [`solver`] → [`equilibrium`] → [`surface`].
+//! [`scenario`] → [`problem`] → [`program`] → [`solver`] → [`equilibrium`] → [`surface`].
 //!
 //! Equation numbers, as in `Eq. (34)`, are those of Wakamatsu, Arai and Hirai, "Fishbone Model for Belt Object
 //! Deformation".
 //!
 //! ```
-//! use fishbone::{equilibrium::solve, scenario::Scenario};
+//! use fishbone::{equilibrium::solve, problem::Problem, scenario::Scenario};
 //! use std::ops::ControlFlow;
 //!
 //! // A belt whose ends face each other at 0.6 of its length: the planar elastica.
@@ -21,7 +21,8 @@
 //!     ]
 //!     "#,
 //! )?;
-//! let equilibrium = solve(&scenario, &mut || ControlFlow::Continue(()));
+//! let problem = Problem::new(scenario)?;
+//! let equilibrium = solve(&problem, &mut || ControlFlow::Continue(()));
 //! assert!((equilibrium.energy - 17.6586).abs() < 1e-4);
 //! assert!((equilibrium.highest_point().position.x - 0.3487).abs() < 1e-4);
 //! # Ok::<(), fishbone::error::ScenarioError>(())
@@ -40,6 +41,7 @@ pub mod linking;
 pub mod margin;
 pub mod material;
 pub mod path;
+pub mod problem;
 pub mod program;
 pub mod result;
 pub mod ritz;

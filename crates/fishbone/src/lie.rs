@@ -75,6 +75,15 @@ impl Mul for Pose {
     }
 }
 
+/// A force and a moment about the point where they act, world axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wrench {
+    /// Force.
+    pub force: Vector3<f64>,
+    /// Moment.
+    pub moment: Vector3<f64>,
+}
+
 /// A twist in body axes: an element of se(3).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Twist {

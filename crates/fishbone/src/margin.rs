@@ -1,9 +1,10 @@
 //! How far a support may move before the belt loses its stability.
 
-use crate::equilibrium::{Equilibrium, Mesh, Status, is_settled};
-use crate::follow::{NoBranch, is_taut_beyond};
+use crate::equilibrium::{Equilibrium, Uncertified, is_settled};
+use crate::follow::{NoBranch, is_near_limit, meshed};
 use crate::lie::{Pose, exp, log};
-use crate::path::{Motion, Path};
+use crate::path::{Motion, NoPath, Path};
+use crate::problem::Mesh;
 use crate::program::{BeltPoint, BeltProgram, rows_of};
 use nalgebra::{Vector3, Vector6};
 use stagewise::{Continuation, End, Events, Family, Pace, Turn};
@@ -32,6 +33,9 @@ pub struct Margin {
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum NoMargin {
+    /// There is no equilibrium.
+    #[error(transparent)]
+    Uncertified(#[from] Uncertified),
     /// The equilibrium cannot be followed.
     #[error(transparent)]
     NoBranch(#[from] NoBranch),
@@ -43,6 +47,9 @@ pub enum NoMargin {
         "supports[{0}] does not hold a position and a rotation, all of both: nothing can be moved there"
     )]
     NotClamped(usize),
+    /// The support may not be moved so far, or not at all.
+    #[error(transparent)]
+    NoPath(#[from] NoPath),
     /// The equilibrium could be followed only so far, stable on the way.
     #[error(
         "the equilibrium could be followed only {0:.3} of the way to `reach`, stable until there: a shorter reach may do"
@@ -60,7 +67,7 @@ struct Boundary {
 
 impl Equilibrium {
     /// How far a support may move along a direction before stability is lost; `None` where that is not so within `reach`, and
-    /// where the belt is taut before.
+    /// where the belt comes to its inextensible limit before.
     ///
     /// Directions are displacement in U and rotation left in world axes about the support point; their length does not matter.
     /// `proceed` is asked once a step whether to go on.
@@ -188,7 +195,7 @@ impl Equilibrium {
             let mut values = [[0.0; LOWEST]; 2];
             for (sign, values) in [1.0, -1.0].into_iter().zip(&mut values) {
                 let way = Way::new(self, support, &(sign * Vector6::ith(axis, 1.0)), STEP)?;
-                let solved = self.solved.as_ref().ok_or(NoBranch::NoMultipliers)?;
+                let solved = self.certified()?;
                 let continuation = way.continuation();
                 let modes = continuation
                     .start(&solved.at, way.path.length(), true)
@@ -220,7 +227,7 @@ impl Equilibrium {
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Result<Option<Boundary>, NoMargin> {
         let way = Way::new(self, support, direction, reach)?;
-        let solved = self.solved.as_ref().ok_or(NoBranch::NoMultipliers)?;
+        let solved = self.certified()?;
         let continuation = way.continuation();
         let start = continuation.start(&solved.at, 0.0, true);
         let start = start.ok_or(NoBranch::Singular)?;
@@ -236,13 +243,14 @@ impl Equilibrium {
             .last()
             .map_or(0.0, |station| station.parameter);
         let event = curve.events.first().filter(|(state, _)| *state <= stable);
-        let is_taut = is_taut_beyond(&way.path, last);
-        let Some((_, event)) = event.filter(|(_, event)| event.turn != Turn::Apex || !is_taut)
+        let is_near_limit = is_near_limit(&way.path, last);
+        let Some((_, event)) =
+            event.filter(|(_, event)| event.turn != Turn::Apex || !is_near_limit)
         else {
             let goes_on = stable == curve.stations.len();
             return match curve.end {
                 End::Range | End::Stopped(()) if goes_on => Ok(None),
-                _ if is_taut => Ok(None),
+                _ if is_near_limit => Ok(None),
                 _ => Err(NoMargin::Lost(last / length)),
             };
         };
@@ -287,20 +295,14 @@ impl Way {
         reach: f64,
     ) -> Result<Self, NoMargin> {
         const LEG: f64 = 3.0;
-        let solved = equilibrium.solved.as_ref().ok_or(NoBranch::NoMultipliers)?;
-        if equilibrium.status != Status::Converged {
-            return Err(NoBranch::NotConverged(equilibrium.message.clone()).into());
-        }
+        let solved = equilibrium.certified()?;
         if equilibrium.stable() != Some(true) {
             return Err(NoMargin::NotStable);
         }
-        let scenario = &equilibrium.scenario;
-        let held = scenario.supports.get(support);
-        let held = held.filter(|held| held.hinge.is_none());
-        let held = held.and_then(|held| held.point().zip(held.frame()));
-        let (position, frame) = held.ok_or(NoMargin::NotClamped(support))?;
-        let from = Pose { frame, position };
-        let length = solved.units.length;
+        let problem = &equilibrium.problem;
+        let from = problem.clamp(support);
+        let from = from.ok_or(NoMargin::NotClamped(support))?;
+        let length = problem.units().length;
         let legs = (reach * direction.fixed_rows::<3>(3).norm() / LEG)
             .ceil()
             .max(1.0);
@@ -309,10 +311,10 @@ impl Way {
             (end.position, log(&end.frame))
         });
         let poses: Vec<_> = ends.collect();
-        let path = Path::poses(scenario, support, &poses, Motion::Straight);
+        let path = Path::poses(problem, support, &poses, Motion::Straight);
         Ok(Self {
-            path: path.map_err(|_| NoMargin::NotClamped(support))?,
-            mesh: Mesh::of(scenario, &solved.program),
+            path: path?,
+            mesh: Mesh::of(problem, &solved.program),
             from,
             direction: *direction,
             length,
@@ -330,16 +332,14 @@ impl Way {
             stations: 1000,
             events: Events::EndAtFirst,
         };
-        let tolerance = self.path.base().solver.tolerance;
+        let tolerance = self.path.base().tolerance();
         Continuation::new(self, tolerance, [0.0, self.path.length()], PACE)
     }
 
     /// Whether the ribs are held by the edges that they reach, and by no other.
     fn holds(&self, station: &Station) -> bool {
-        let scenario = self.path.at(station.parameter);
-        let program = scenario.and_then(|scenario| Some((self.mesh.program(&scenario)?, scenario)));
-        program
-            .is_some_and(|(program, scenario)| is_settled(&scenario, &program, &station.at.point))
+        let meshed = meshed(&self.path, &self.mesh, station.parameter);
+        meshed.is_some_and(|(problem, program)| is_settled(&problem, &program, &station.at.point))
     }
 }
 
@@ -357,6 +357,6 @@ impl Family<6, 2, 8> for Way {
     type Program = BeltProgram;
 
     fn at(&self, place: f64) -> Option<BeltProgram> {
-        self.mesh.program(&self.path.at(place)?)
+        self.path.at(place)?.program_on(&self.mesh)
     }
 }

@@ -1,15 +1,16 @@
-//! Ways through the space of scenarios: one number or several that change together, or a support that moves.
+//! Ways through the space of problems: one number or several that change together, or a support that moves.
 
+use crate::error::ScenarioError;
 use crate::lie::{Pose, Twist, exp, log};
-use crate::scenario::{Component, Scenario};
+use crate::problem::Problem;
 use nalgebra::Vector3;
 use serde_json::Value;
 use thiserror::Error;
 
-/// How a scenario changes.
+/// How a problem changes: the problem where the path begins, and what of its scenario differs from place to place.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Path {
-    base: Scenario,
+    base: Problem,
     change: Change,
 }
 
@@ -66,13 +67,16 @@ pub enum NoPath {
         "supports[{0}]: found a support that does not hold a position and a rotation, allowed one that does"
     )]
     NotClamped(usize),
+    /// The support may not be held at one of the poses, counted from 0.
+    #[error("poses[{0}]: {1}")]
+    NoPose(usize, String),
     /// The scenario at its end is none.
     #[error("at the end of the path, {0}")]
     Invalid(String),
 }
 
-/// A value that is no number, by its kind where it is long.
-fn told(value: &Value) -> String {
+/// A value that is no number as text; by its kind where that is long.
+fn shown(value: &Value) -> String {
     const SHORT: usize = 40;
     let text = value.to_string();
     match value {
@@ -89,15 +93,15 @@ impl Path {
     /// # Errors
     ///
     /// [`NoPath`] where no such number stands in the scenario, and where the scenario at the end is not valid.
-    pub fn numbers(scenario: &Scenario, changes: &[(String, f64)]) -> Result<Self, NoPath> {
-        let base = serde_json::to_value(scenario).expect("a scenario is plain data");
+    pub fn numbers(problem: &Problem, changes: &[(String, f64)]) -> Result<Self, NoPath> {
+        let base = serde_json::to_value(problem.scenario()).expect("a scenario is plain data");
         let number = |(field, to): &(String, f64)| {
             let pointer = pointer(field);
             let found = base.pointer(&pointer);
             let from = found.and_then(Value::as_f64);
             let from = from.ok_or_else(|| NoPath::NoNumber {
                 field: field.clone(),
-                found: found.map_or("nothing".to_owned(), told),
+                found: found.map_or("nothing".to_owned(), shown),
                 example: "supports[1].position[1]".to_owned(),
             })?;
             Ok(Number {
@@ -111,7 +115,7 @@ impl Path {
             return Err(NoPath::Nothing);
         }
         Self {
-            base: scenario.clone(),
+            base: problem.clone(),
             change: Change::Numbers { base, numbers },
         }
         .checked()
@@ -121,29 +125,36 @@ impl Path {
     ///
     /// # Errors
     ///
-    /// [`NoPath`] where there are no others, and where the support does not hold all of a pose.
+    /// [`NoPath`] where there are no others, where the support does not hold all of a pose, and where it may not be held at
+    /// one of them.
     pub fn poses(
-        scenario: &Scenario,
+        problem: &Problem,
         support: usize,
-        poses: &[(Vector3<f64>, Vector3<f64>)],
+        given: &[(Vector3<f64>, Vector3<f64>)],
         motion: Motion,
     ) -> Result<Self, NoPath> {
-        let held = scenario.supports.get(support);
-        let held = held.ok_or(NoPath::NotClamped(support))?;
-        let (Some(position), Some(frame), None) = (held.point(), held.frame(), held.hinge) else {
-            return Err(NoPath::NotClamped(support));
-        };
-        let first = Pose { frame, position };
-        let others = poses.iter().map(|(position, rotation)| Pose {
+        let first = problem.clamp(support);
+        let first = first.ok_or(NoPath::NotClamped(support))?;
+        let others = given.iter().map(|(position, rotation)| Pose {
             frame: exp(rotation),
             position: *position,
         });
         let poses: Vec<_> = std::iter::once(first).chain(others).collect();
+        for (i, (pose, (_, rotation))) in poses[1..].iter().zip(given).enumerate() {
+            if rotation.iter().any(|angle| !angle.is_finite()) {
+                return Err(NoPath::NoPose(
+                    i,
+                    "found a rotation that is not finite".to_owned(),
+                ));
+            }
+            let refused = |error: ScenarioError| NoPath::NoPose(i, error.to_string());
+            problem.check_support_pose(support, pose).map_err(refused)?;
+        }
         if poses.iter().all(|pose| *pose == first) {
             return Err(NoPath::Nothing);
         }
         Self {
-            base: scenario.clone(),
+            base: problem.clone(),
             change: Change::Poses {
                 support,
                 poses,
@@ -153,8 +164,8 @@ impl Path {
         .checked()
     }
 
-    /// The scenario where the path begins.
-    pub fn base(&self) -> &Scenario {
+    /// The problem where the path begins.
+    pub fn base(&self) -> &Problem {
         &self.base
     }
 
@@ -177,12 +188,12 @@ impl Path {
         }
     }
 
-    /// The scenario at a place on the path, or a little before or beyond it; `None` where that is not valid.
-    pub fn at(&self, place: f64) -> Option<Scenario> {
-        self.scenario(place).ok()
+    /// The problem at a place on the path, or a little before or beyond it; `None` where the scenario there is not valid.
+    pub fn at(&self, place: f64) -> Option<Problem> {
+        self.problem(place).ok()
     }
 
-    fn scenario(&self, place: f64) -> Result<Scenario, String> {
+    fn problem(&self, place: f64) -> Result<Problem, String> {
         match &self.change {
             Change::Numbers { base, numbers } => {
                 let mut tables = base.clone();
@@ -191,10 +202,8 @@ impl Path {
                         *value = number.at(place).into();
                     }
                 }
-                let scenario: Scenario =
-                    serde_json::from_value(tables).map_err(|error| error.to_string())?;
-                scenario.validate().map_err(|error| error.to_string())?;
-                Ok(scenario)
+                let scenario = serde_json::from_value(tables).map_err(|error| error.to_string())?;
+                Problem::new(scenario).map_err(|error| error.to_string())
             }
             Change::Poses {
                 support,
@@ -203,25 +212,16 @@ impl Path {
             } => {
                 let leg = (place.max(0.0) as usize).min(poses.len() - 2);
                 let pose = motion.between(&poses[leg], &poses[leg + 1], place - leg as f64);
-                Ok(with_pose(&self.base, *support, &pose))
+                let moved = self.base.with_support_pose(*support, &pose);
+                moved.map_err(|error| error.to_string())
             }
         }
     }
 
     fn checked(self) -> Result<Self, NoPath> {
-        self.scenario(self.length()).map_err(NoPath::Invalid)?;
+        self.problem(self.length()).map_err(NoPath::Invalid)?;
         Ok(self)
     }
-}
-
-/// The scenario with a support at another pose.
-pub(crate) fn with_pose(scenario: &Scenario, support: usize, pose: &Pose) -> Scenario {
-    let mut scenario = scenario.clone();
-    let support = &mut scenario.supports[support];
-    support.position = Some([0, 1, 2].map(|i| Component::Held(pose.position[i])));
-    support.rotation = Some(log(&pose.frame).into());
-    (support.euler, support.quaternion) = (None, None);
-    scenario
 }
 
 impl Number {

@@ -1,7 +1,8 @@
 //! The result schema `fishbone.result/1`: an equilibrium as it is written to JSON.
 
 use crate::energy::EnergyModel;
-use crate::equilibrium::{Equilibrium, LinkForce, Status, Wrench};
+use crate::equilibrium::{Equilibrium, LinkForce, Status};
+use crate::lie::Wrench;
 use crate::scenario::Scenario;
 use crate::surface;
 use nalgebra::{Matrix3, Vector3};
@@ -126,7 +127,7 @@ impl Equilibrium {
 
     /// The point of the spine farthest along `solver.bulge`.
     pub fn highest_point(&self) -> surface::HighestPoint {
-        surface::highest_point(&self.spine, &Vector3::from(self.scenario.solver.bulge))
+        surface::highest_point(&self.spine, &self.problem.bulge())
     }
 }
 
@@ -143,7 +144,7 @@ impl<'a> Record<'a> {
             warnings: &equilibrium.warnings,
             energy: equilibrium.energy,
             elastic_energy: equilibrium.elastic_energy,
-            energy_model: equilibrium.scenario.energy,
+            energy_model: equilibrium.scenario().energy,
             u: &spine.u,
             position: spine.pose.iter().map(|p| p.position.into()).collect(),
             frame: spine.pose.iter().map(|p| row_major(&p.frame)).collect(),
@@ -178,7 +179,7 @@ impl<'a> Record<'a> {
                 complementarity: equilibrium.residuals.complementarity,
             },
             iterations: equilibrium.iterations,
-            scenario: &equilibrium.scenario,
+            scenario: equilibrium.scenario(),
         }
     }
 }

@@ -9,7 +9,8 @@ mod motion;
 mod scales;
 mod system;
 
-use crate::equilibrium::{Equilibrium, Status, Wrench};
+use crate::equilibrium::{Equilibrium, Uncertified};
+use crate::lie::Wrench;
 use nalgebra::{Matrix3x6, Vector3};
 use scales::Scales;
 use stagewise::{Response, Singular};
@@ -63,14 +64,9 @@ pub struct Change {
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum NoSensitivity {
-    /// The method of the solve has no first-order conditions that it meets.
-    #[error(
-        "the source's method knows no multipliers, which derivatives take: use solver.method = \"intrinsic\""
-    )]
-    NoMultipliers,
     /// There is no equilibrium.
-    #[error("the solve has not converged: what it ended with has no derivatives")]
-    NotConverged,
+    #[error(transparent)]
+    Uncertified(#[from] Uncertified),
     /// The shape does not follow from the supports.
     #[error(
         "the belt can move at no cost of energy, so that its supports do not determine the shape, which has no derivatives"
@@ -84,12 +80,12 @@ pub enum NoSensitivity {
     /// The shape is no minimum.
     #[error("the equilibrium is no minimum of the energy: derivatives are of minima only")]
     Saddle,
-    /// Some conditions follow from others.
+    /// Some constraints follow from others.
     #[error("{0} hold the same twice over: they cannot move each by itself")]
-    HeldTwice(String),
-    /// The supports cannot be moved so.
+    Redundant(String),
+    /// The belt is at its inextensible limit, so that the supports cannot move so.
     #[error("the belt between its supports has no slack: they cannot move each by itself")]
-    Taut,
+    NoSlack,
 }
 
 /// A vector of the first-order conditions.
@@ -111,12 +107,9 @@ impl Equilibrium {
     ///
     /// [`NoSensitivity`] unless it is a strict minimum that its supports determine.
     pub fn sensitivity(&self) -> Result<Sensitivity, NoSensitivity> {
-        let solved = self.solved.as_ref().ok_or(NoSensitivity::NoMultipliers)?;
-        if self.status != Status::Converged {
-            return Err(NoSensitivity::NotConverged);
-        }
-        if let Some(names) = &solved.said_twice {
-            return Err(NoSensitivity::HeldTwice(names.clone()));
+        let solved = self.certified()?;
+        if let Some(names) = &solved.redundant {
+            return Err(NoSensitivity::Redundant(names.clone()));
         }
         if solved.inertia.is_some_and(|inertia| inertia.negative > 0) {
             return Err(NoSensitivity::Saddle);
@@ -128,7 +121,7 @@ impl Equilibrium {
         let mut sensitivity = Sensitivity {
             response: response.map_err(|Singular| NoSensitivity::Marginal)?,
             system: System::new(solved),
-            scales: Scales::new(&self.scenario, solved),
+            scales: Scales::new(&self.problem, &solved.program),
             nodes: solved.at.point.poses.len(),
         };
         let is_strict = solved.inertia.is_some_and(|inertia| inertia.zero == 0);
@@ -186,7 +179,7 @@ impl Sensitivity {
     ///
     /// # Errors
     ///
-    /// [`NoSensitivity::Taut`] where the supports cannot move so.
+    /// [`NoSensitivity::NoSlack`] where the supports cannot move so.
     pub fn forward(&mut self, parameters: &Parameters) -> Result<Change, NoSensitivity> {
         let direction = self.scales.to_program(parameters, &self.system);
         let mut right = self.response.zero();
@@ -219,7 +212,7 @@ impl Sensitivity {
     ///
     /// # Errors
     ///
-    /// [`NoSensitivity::Taut`] where the supports cannot move each by itself.
+    /// [`NoSensitivity::NoSlack`] where the supports cannot move each by itself.
     pub fn adjoint(&mut self, by: &Change) -> Result<Parameters, NoSensitivity> {
         let units = self.scales.units;
         let mut direction = self.system.unchanged();
@@ -253,7 +246,7 @@ impl Sensitivity {
     ///
     /// # Errors
     ///
-    /// [`NoSensitivity::Taut`] where the support cannot move by itself.
+    /// [`NoSensitivity::NoSlack`] where the support cannot move by itself.
     ///
     /// # Panics
     ///
@@ -297,7 +290,7 @@ impl Sensitivity {
     fn solve(&mut self, right: &Step) -> Result<Step, NoSensitivity> {
         self.response
             .solve(right)
-            .map_err(|Singular| NoSensitivity::Taut)
+            .map_err(|Singular| NoSensitivity::NoSlack)
     }
 }
 

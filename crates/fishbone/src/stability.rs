@@ -1,6 +1,6 @@
 //! The second variation of the energy at an equilibrium: whether it is a minimum, and along which motions least so.
 
-use crate::equilibrium::{Equilibrium, Status};
+use crate::equilibrium::{Equilibrium, Uncertified};
 use crate::program::NodeVector;
 use crate::sensitivity::Motion;
 use stagewise::Singular;
@@ -34,17 +34,12 @@ pub struct Mode {
 }
 
 /// Why an equilibrium has no modes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum NoModes {
-    /// The method of the solve has no first-order conditions that it meets.
-    #[error(
-        "the source's method knows no multipliers, which modes take: use solver.method = \"intrinsic\""
-    )]
-    NoMultipliers,
     /// There is no equilibrium.
-    #[error("the solve has not converged: what it ended with has no modes")]
-    NotConverged,
+    #[error(transparent)]
+    Uncertified(#[from] Uncertified),
     /// The factorisation broke down.
     #[error("the second variation could not be factorised")]
     Singular,
@@ -73,12 +68,10 @@ impl Equilibrium {
     ///
     /// [`NoModes`] unless the solve has converged.
     pub fn modes(&self, count: usize) -> Result<Vec<Mode>, NoModes> {
-        let solved = self.solved.as_ref().ok_or(NoModes::NoMultipliers)?;
-        if self.status != Status::Converged {
-            return Err(NoModes::NotConverged);
-        }
+        let solved = self.certified()?;
         let modes = stagewise::lowest_modes(&solved.program, &mut solved.at.clone(), count);
-        let length = solved.units.length;
+        let units = self.problem.units();
+        let length = units.length;
         let of_node = |node: usize, motion: &NodeVector| {
             let rotation = motion.fixed_rows::<3>(3).into_owned();
             let position = solved.at.point.poses[node].position;
@@ -90,7 +83,7 @@ impl Equilibrium {
         let mode = |mode: stagewise::Mode<8>| {
             let nodes = mode.motion.iter();
             Mode {
-                eigenvalue: mode.eigenvalue * solved.units.energy / length.powi(2),
+                eigenvalue: mode.eigenvalue * units.energy / length.powi(2),
                 motion: nodes
                     .clone()
                     .enumerate()

@@ -1,10 +1,10 @@
 //! Follows an equilibrium at the rate of a robot while one of its supports moves.
 
-use crate::equilibrium::{Equilibrium, Status, Units, Wrench, is_settled, of_solution, solve_near};
-use crate::lie::{Pose, exp};
-use crate::path::with_pose;
+use crate::equilibrium::{Equilibrium, Status, Uncertified, is_settled, of_solution, solve_near};
+use crate::error::ScenarioError;
+use crate::lie::{Pose, Wrench, exp};
+use crate::problem::{Problem, Units};
 use crate::program::{BeltPoint, BeltProgram, Piece, rows_of};
-use crate::scenario::Scenario;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use stagewise::{Distance, FollowSettings, Followed, Follower, Residuals};
 use std::ops::ControlFlow;
@@ -18,12 +18,9 @@ const SMALLEST_JUMP: f64 = 2e-3;
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum NoTracker {
-    /// The method of the solve has no first-order conditions that it meets.
-    #[error("the source's method cannot follow: use solver.method = \"intrinsic\"")]
-    NoMultipliers,
     /// There is no equilibrium.
-    #[error("there is nothing to follow: {0}")]
-    NotConverged(String),
+    #[error(transparent)]
+    Uncertified(#[from] Uncertified),
     /// The support does not hold all of a pose.
     #[error(
         "supports[{0}] does not hold a position and a rotation, all of both: nothing can be moved there"
@@ -55,13 +52,12 @@ pub struct Update {
 
 /// An equilibrium and the support that moves.
 pub struct Tracker {
-    scenario: Scenario,
+    /// What was solved where the tracker began.
+    problem: Problem,
     support: usize,
     follower: Follower<BeltProgram, 6, 2, 8>,
     /// Where the support is, in the units of the programme.
     pose: Pose,
-    units: Units,
-    origin: Vector3<f64>,
     /// What the potential of the programme lacks.
     potential_of_origin: f64,
     /// Whether ribs of one stretch may reach the edges of another.
@@ -75,19 +71,16 @@ impl Tracker {
     ///
     /// [`NoTracker`] unless it has converged to a strict minimum and the support holds position and rotation.
     pub fn new(equilibrium: &Equilibrium, support: usize) -> Result<Self, NoTracker> {
-        let solved = equilibrium.solved.as_ref();
-        let solved = solved.ok_or(NoTracker::NoMultipliers)?;
-        if equilibrium.status != Status::Converged {
-            return Err(NoTracker::NotConverged(equilibrium.message.clone()));
+        let solved = equilibrium.certified()?;
+        let problem = equilibrium.problem.clone();
+        if support >= problem.scenario().supports.len() {
+            return Err(NoTracker::NoSupport(support));
         }
-        let scenario = equilibrium.scenario.clone();
-        let held = scenario.supports.get(support);
-        let held = held.ok_or(NoTracker::NoSupport(support))?;
-        let (Some(position), Some(frame), None) = (held.point(), held.frame(), held.hinge) else {
-            return Err(NoTracker::NotClamped(support));
-        };
+        let Pose { frame, position } = problem
+            .clamp(support)
+            .ok_or(NoTracker::NotClamped(support))?;
         let settings = FollowSettings {
-            tolerance: scenario.solver.tolerance,
+            tolerance: problem.tolerance(),
             smallest_jump: SMALLEST_JUMP,
         };
         let follower = Follower::new(solved.program.clone(), settings, &solved.at);
@@ -97,7 +90,7 @@ impl Tracker {
             Piece::Joint { angle } => *angle != 0.0,
             Piece::Rigid { .. } => false,
         };
-        let (units, origin) = (solved.units, solved.origin);
+        let (units, origin) = (problem.units(), problem.origin());
         let (program, point) = (&solved.program, &solved.at.point);
         let stored = program.elastic_energy(&point.fields) + program.load_potential(&point.poses);
         Ok(Self {
@@ -108,17 +101,16 @@ impl Tracker {
             },
             has_bends: solved.program.pieces.iter().any(bends),
             potential_of_origin: equilibrium.energy - stored * units.energy,
-            scenario,
+            problem,
             follower,
-            units,
-            origin,
         })
     }
 
     /// Moves the support to a position and a rotation vector, world axes, and the belt with it.
     ///
     /// Nothing is allocated where the equilibrium is followed and the board has neither links nor bends. `proceed` is asked
-    /// now and then whether to go on; `Break` leaves the tracker where it was.
+    /// now and then whether to go on; `Break` leaves the tracker where it was. So does a pose that no scenario may hold, which
+    /// is infeasible: one that is not finite, or too many lengths of the belt away.
     pub fn update(
         &mut self,
         position: &Vector3<f64>,
@@ -127,9 +119,15 @@ impl Tracker {
     ) -> Update {
         let goal = Pose {
             frame: exp(rotation),
-            position: (position - self.origin) / self.units.length,
+            position: (position - self.problem.origin()) / self.units().length,
         };
         let (from, support) = (self.pose, self.support);
+        let held = self.in_scenario(&goal);
+        let may_hold = self.problem.check_support_pose(support, &held).is_ok();
+        // A rotation vector that is not finite makes a frame that is.
+        if !may_hold || rotation.iter().any(|angle| !angle.is_finite()) {
+            return self.refused();
+        }
         let turn = turn_between(&from.frame, &goal.frame);
         let length = (goal.position - from.position).norm() + turn.norm();
         let mut change = |program: &mut BeltProgram, share: f64| {
@@ -153,9 +151,23 @@ impl Tracker {
                 residuals: followed.residuals,
             };
         }
-        let scenario = self.scenario_at(&goal);
-        let found = solve_near(&scenario, self.follower.point(), proceed);
+        let Ok(problem) = self.problem_at(&goal) else {
+            self.return_to_start();
+            return self.refused();
+        };
+        let found = solve_near(&problem, self.follower.point(), proceed);
         self.take(&found, followed)
+    }
+
+    /// What becomes of the belt where its support may not be held: it stays where it was.
+    fn refused(&mut self) -> Update {
+        Update {
+            status: Status::Infeasible,
+            snapped: false,
+            energy: self.energy(),
+            iterations: 0,
+            residuals: self.follower.solution().residuals,
+        }
     }
 
     /// Takes over what was found where the last equilibrium could not be followed, or reaches edges that it did not before.
@@ -175,9 +187,7 @@ impl Tracker {
         match Self::new(found, self.support) {
             Ok(other) => *self = other,
             Err(_) => {
-                let (support, pose) = (self.support, self.pose);
-                self.follower
-                    .return_to_start(|program| program.move_support(support, &pose));
+                self.return_to_start();
                 if update.status == Status::Converged {
                     (update.status, update.snapped) = (Status::NotConverged, false);
                 }
@@ -190,26 +200,43 @@ impl Tracker {
     fn is_settled(&self) -> bool {
         !self.has_bends
             || is_settled(
-                &self.scenario,
+                &self.problem,
                 self.follower.program(),
                 self.follower.point(),
             )
     }
 
-    /// The scenario with the support elsewhere.
-    fn scenario_at(&self, pose: &Pose) -> Scenario {
-        let pose = Pose {
+    fn return_to_start(&mut self) {
+        let (support, pose) = (self.support, self.pose);
+        self.follower
+            .return_to_start(|program| program.move_support(support, &pose));
+    }
+
+    fn units(&self) -> Units {
+        self.problem.units()
+    }
+
+    /// A pose of the programme in the units of the scenario.
+    fn in_scenario(&self, pose: &Pose) -> Pose {
+        Pose {
             frame: pose.frame,
-            position: self.origin + pose.position * self.units.length,
-        };
-        with_pose(&self.scenario, self.support, &pose)
+            position: self.problem.origin() + pose.position * self.units().length,
+        }
+    }
+
+    /// The problem with the support elsewhere. The programme keeps its origin, also where that is the support that moves.
+    fn problem_at(&self, pose: &Pose) -> Result<Problem, ScenarioError> {
+        let pose = self.in_scenario(pose);
+        let moved = self.problem.with_support_pose(self.support, &pose)?;
+        Ok(moved.about(self.problem.origin()))
     }
 
     /// All that is to be known of the present equilibrium.
     pub fn equilibrium(&mut self) -> Equilibrium {
-        let scenario = self.scenario_at(&self.pose);
+        let problem = self.problem_at(&self.pose);
+        let problem = problem.expect("the pose was checked before the belt was led there");
         let solution = self.follower.solution();
-        of_solution(&scenario, self.follower.program().clone(), solution)
+        of_solution(&problem, self.follower.program().clone(), solution)
     }
 
     fn point(&self) -> &BeltPoint {
@@ -218,13 +245,13 @@ impl Tracker {
 
     /// Total potential.
     pub fn energy(&self) -> f64 {
-        self.follower.values().objective * self.units.energy + self.potential_of_origin
+        self.follower.values().objective * self.units().energy + self.potential_of_origin
     }
 
     /// Positions of the nodes.
     pub fn positions(&self) -> impl Iterator<Item = Vector3<f64>> {
         let poses = self.point().poses.iter();
-        poses.map(|pose| self.origin + pose.position * self.units.length)
+        poses.map(|pose| self.problem.origin() + pose.position * self.units().length)
     }
 
     /// Frames of the nodes.
@@ -235,7 +262,7 @@ impl Tracker {
     /// Bend at the nodes.
     pub fn bends(&self) -> impl Iterator<Item = f64> {
         let fields = self.point().fields.iter();
-        fields.map(|fields| fields[0] / self.units.length)
+        fields.map(|fields| fields[0] / self.units().length)
     }
 
     /// Rib slope at the nodes.
@@ -252,7 +279,7 @@ impl Tracker {
         let program = self.follower.program();
         let rows = rows_of(&self.follower.multipliers().equalities, support);
         let held = &program.supports[support];
-        self.units
+        self.units()
             .wrench(held.reaction(&self.point().poses[held.node], &rows))
     }
 }

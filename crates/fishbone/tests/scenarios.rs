@@ -1,12 +1,15 @@
 //! The shipped scenarios, solved: the golden cases of every suite.
 
-use fishbone::equilibrium::{Equilibrium, Status, solve};
+use fishbone::equilibrium::{Equilibrium, NoShape, Status, Uncertified, solve, solve_from};
+use fishbone::problem::Problem;
 use fishbone::scenario::Scenario;
+use fishbone::sensitivity::NoSensitivity;
+use fishbone::stability::NoModes;
 use std::ops::ControlFlow;
 
 fn solved(text: &str) -> Equilibrium {
-    let scenario = Scenario::from_toml(text).unwrap();
-    solve(&scenario, &mut || ControlFlow::Continue(()))
+    let problem = Problem::new(Scenario::from_toml(text).unwrap()).unwrap();
+    solve(&problem, &mut || ControlFlow::Continue(()))
 }
 
 /// Converged to a minimum: residuals, supports and bounds, whatever the solver says of them.
@@ -19,7 +22,7 @@ fn assert_minimum(equilibrium: &Equilibrium) {
     );
     assert_eq!(equilibrium.stable(), Some(true));
     assert!(equilibrium.residuals.largest() <= 1e-8);
-    let (spine, scenario) = (&equilibrium.spine, &equilibrium.scenario);
+    let (spine, scenario) = (&equilibrium.spine, equilibrium.scenario());
     for (support, pose) in scenario
         .supports
         .iter()
@@ -167,6 +170,11 @@ fn test_the_sources_own_method_never_calls_its_compromise_converged() {
     );
     assert!(equilibrium.residuals.constraint > 1e-2);
     assert_near(equilibrium.highest_point().position.x, 0.35, 5e-3);
+    let uncertified = Uncertified::NoMultipliers;
+    let modes = equilibrium.modes(1);
+    assert_eq!(modes, Err(NoModes::Uncertified(uncertified.clone())));
+    let derivatives = equilibrium.sensitivity().map(drop);
+    assert_eq!(derivatives, Err(NoSensitivity::Uncertified(uncertified)));
 }
 
 #[test]
@@ -184,7 +192,9 @@ fn test_supports_out_of_reach_are_infeasible_by_the_missing_length() {
 #[test]
 fn test_caller_ends_a_solve() {
     let scenario = Scenario::from_toml(include_str!("../../../scenarios/example1.toml")).unwrap();
-    let equilibrium = solve(&scenario, &mut || ControlFlow::Break(()));
+    let equilibrium = solve(&Problem::new(scenario).unwrap(), &mut || {
+        ControlFlow::Break(())
+    });
     assert_eq!(
         (equilibrium.status, equilibrium.iterations),
         (Status::NotConverged, 0)
@@ -241,10 +251,10 @@ fn test_caller_ends_a_solve_by_saying_so_once() {
     // Hardly to be reached, so that the search passes through its restoration.
     let text = include_str!("../../../scenarios/planar.toml")
         .replace("[0.0, 0.6, 0.0]", "[0.0, 0.7, 0.7]");
-    let scenario = Scenario::from_toml(&text).unwrap();
+    let problem = Problem::new(Scenario::from_toml(&text).unwrap()).unwrap();
     for last in 1..40 {
         let mut asked = 0;
-        let equilibrium = solve(&scenario, &mut || {
+        let equilibrium = solve(&problem, &mut || {
             asked += 1;
             if asked == last {
                 ControlFlow::Break(())
@@ -260,4 +270,21 @@ fn test_caller_ends_a_solve_by_saying_so_once() {
         );
         assert!(asked <= last);
     }
+}
+
+#[test]
+fn test_solve_from_a_shape_ends_in_its_equilibrium_and_refuses_what_is_no_shape() {
+    let scenario = Scenario::from_toml(include_str!("../../../scenarios/planar.toml")).unwrap();
+    let problem = Problem::new(scenario).unwrap();
+    let from = |bend: &[f64], slope: &[f64]| {
+        solve_from(&problem, bend, slope, &mut || ControlFlow::Continue(()))
+    };
+    let found = solve(&problem, &mut || ControlFlow::Continue(()));
+    let again = from(&found.spine.bend, &found.spine.rib_slope).unwrap();
+    assert_near(again.energy, found.energy, 1e-8 * found.energy);
+    let lengths = |bend, rib_slope| NoShape::Lengths { bend, rib_slope };
+    assert_eq!(from(&[0.0], &[0.0]), Err(lengths(1, 1)));
+    assert_eq!(from(&[0.0; 2], &[0.0; 3]), Err(lengths(2, 3)));
+    let not_finite = from(&[0.0; 3], &[0.0, f64::NAN, 0.0]);
+    assert_eq!(not_finite, Err(NoShape::NotFinite(1)));
 }

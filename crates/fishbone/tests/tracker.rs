@@ -1,14 +1,15 @@
 //! Following an equilibrium from Rust: what it costs, and where it leads.
 
-use fishbone::equilibrium::{Equilibrium, Status, solve};
+use fishbone::equilibrium::{Equilibrium, Status, Uncertified, solve};
+use fishbone::problem::Problem;
 use fishbone::scenario::Scenario;
 use fishbone::tracker::{NoTracker, Tracker, Update};
 use nalgebra::Vector3;
 use std::ops::ControlFlow;
 
 fn solved(toml: &str) -> Equilibrium {
-    let scenario = Scenario::from_toml(toml).unwrap();
-    solve(&scenario, &mut || ControlFlow::Continue(()))
+    let problem = Problem::new(Scenario::from_toml(toml).unwrap()).unwrap();
+    solve(&problem, &mut || ControlFlow::Continue(()))
 }
 
 /// A straight belt with its end at (0, y, 0.1).
@@ -84,11 +85,49 @@ fn test_what_cannot_be_followed_is_refused() {
     let out_of_reach = Tracker::new(&solved(&clamped(1.5)), 1);
     assert!(matches!(
         out_of_reach.err(),
-        Some(NoTracker::NotConverged(_))
+        Some(NoTracker::Uncertified(Uncertified::NotConverged { .. }))
     ));
     let pinned = clamped(0.5).replace(", 0.1], rotation = [0, 0, 0] }", ", 0.1] }");
     assert_eq!(
         Tracker::new(&solved(&pinned), 1).err(),
         Some(NoTracker::NotClamped(1))
     );
+}
+
+#[test]
+fn test_belt_is_where_its_first_support_was_moved_to() {
+    let mut tracker = Tracker::new(&solved(&clamped(0.5)), 0).unwrap();
+    let to = Vector3::new(0.05, -0.02, 0.03);
+    let moved = tracker.update(&to, &Vector3::zeros(), &mut || ControlFlow::Continue(()));
+    assert_eq!(moved.status, Status::Converged);
+    let equilibrium = tracker.equilibrium();
+    assert!((equilibrium.spine.pose[0].position - to).norm() < 1e-9);
+    for (pose, position) in equilibrium.spine.pose.iter().zip(tracker.positions()) {
+        assert!((pose.position - position).norm() < 1e-12);
+    }
+    // What is tracked from there on begins where the belt is.
+    let again = Tracker::new(&equilibrium, 0).unwrap();
+    assert!((again.positions().next().unwrap() - to).norm() < 1e-9);
+}
+
+#[test]
+fn test_pose_that_no_support_may_have_leaves_the_tracker_where_it_was() {
+    let mut tracker = Tracker::new(&solved(&clamped(0.5)), 1).unwrap();
+    let energy = tracker.energy();
+    let (at, level) = (Vector3::new(0.0, 0.5, 0.1), Vector3::zeros());
+    let poses = [
+        (f64::NAN * at, level),
+        (1e9 * at, level),
+        (at, Vector3::new(f64::NAN, 0.0, 0.0)),
+        (at, Vector3::new(0.0, f64::INFINITY, 0.0)),
+    ];
+    for (position, rotation) in poses {
+        let go_on = &mut || ControlFlow::Continue(());
+        let refused = tracker.update(&position, &rotation, go_on);
+        assert_eq!(
+            (refused.status, refused.snapped),
+            (Status::Infeasible, false)
+        );
+        assert_eq!(tracker.energy(), energy);
+    }
 }

@@ -1,17 +1,16 @@
 //! Where the search for all equilibria starts.
 
-use crate::equilibrium::program_of;
 use crate::guess::{guess, waved};
+use crate::problem::Problem;
 use crate::program::BeltPoint;
-use crate::scenario::Scenario;
-use nalgebra::{Vector2, Vector3};
+use nalgebra::Vector2;
 use std::f64::consts::PI;
 
 /// Shapes from which to search: arches to both sides and the straight belt with waves of bend and of rib slope over them,
 /// then sums of waves that cover the space of such sums evenly.
-pub(super) fn starts(scenario: &Scenario) -> Vec<BeltPoint> {
-    let program = program_of(scenario, scenario.elements());
-    let bulge = Vector3::from(scenario.solver.bulge);
+pub(super) fn starts(problem: &Problem) -> Vec<BeltPoint> {
+    let program = problem.program(problem.elements());
+    let bulge = problem.bulge();
     let [up, down] = [bulge, -bulge].map(|bulge| guess(&program, &bulge));
     let mut starts = Vec::new();
     for (base, kept) in [(&up, 1.0), (&down, 1.0), (&up, 0.0)] {

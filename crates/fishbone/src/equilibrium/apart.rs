@@ -5,9 +5,9 @@
 //! the edges that the ribs of the shape found are nearest to crossing at, until none cross and none is held by an edge that it
 //! does not reach.
 
-use super::assembly::Assembly;
 use super::search::Search;
 use crate::element::Element;
+use crate::problem::Problem;
 use crate::program::{BeltPoint, BeltProgram, Piece};
 use crate::spine::Spine;
 use crate::strip::{Edge, FURTHER};
@@ -15,7 +15,7 @@ use crate::surface::{crossings, further_edges};
 use stagewise::{Outcome, Solution};
 use std::ops::ControlFlow;
 
-/// Most times that further edges are taken.
+/// Most times that the active edges are chosen anew.
 const ROUNDS: usize = 20;
 /// An edge at which 1 − s v is below this holds ribs.
 const TOUCHING: f64 = 1e-4;
@@ -25,21 +25,21 @@ const SAME: f64 = 1e-3;
 /// Goes on from a minimum in which ribs may cross to one in which they do not, and bounds the programme so; with the arc
 /// length where the edges are not settled, if they are not: ribs cross there, or are held by an edge they do not reach.
 pub(super) fn keep_apart(
-    assembly: &Assembly,
+    problem: &Problem,
     search: &Search,
     program: &mut BeltProgram,
     mut solution: Solution<BeltPoint>,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> (Solution<BeltPoint>, Option<f64>) {
     for _ in 0..ROUNDS {
-        let spine = assembly.spine(program, &solution.at.point);
+        let spine = problem.spine(program, &solution.at.point);
         if solution.outcome != Outcome::Converged || unsettled(program, &spine).is_none() {
             return (solution, None);
         }
-        take_further_edges(program, &spine);
+        bound_by_edges_beyond(program, &spine);
         solution = search.again(program, solution, proceed);
     }
-    let spine = assembly.spine(program, &solution.at.point);
+    let spine = problem.spine(program, &solution.at.point);
     let unsettled = unsettled(program, &spine).map(|element| spine.u[element]);
     (solution, unsettled)
 }
@@ -76,7 +76,7 @@ pub(super) fn unsettled(program: &BeltProgram, spine: &Spine) -> Option<usize> {
 }
 
 /// Bounds every element by the edges that its ribs reach past those of their own stretch.
-fn take_further_edges(program: &mut BeltProgram, spine: &Spine) {
+fn bound_by_edges_beyond(program: &mut BeltProgram, spine: &Spine) {
     let scale = 1.0 / spine.length();
     for (k, edges) in further_edges(spine) {
         if let Piece::Strip(element) = &mut program.pieces[k] {

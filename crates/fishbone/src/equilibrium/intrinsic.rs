@@ -1,15 +1,11 @@
 //! The intrinsic method: the interior-point search in the two fields bend and rib slope.
 
 use super::apart::{keep_apart, unsettled};
-use super::assembly::Assembly;
 use super::search::{CLOSE, COLD, Search, is_flat_under_load};
-use super::{
-    Equilibrium, LinkForce, Reaction, Solved, Start, Status, Units, Wrench, excess_distance,
-    is_taut, number,
-};
-use crate::belt::Belt;
+use super::{Equilibrium, LinkForce, Reaction, Solved, Start, Status};
 use crate::guess::{disturb, guess};
 use crate::linking::half_turns;
+use crate::problem::{Problem, number};
 use crate::program::{self, BeltPoint, BeltProgram, ROWS};
 use crate::scenario::{Scenario, SupportSpec};
 use crate::stability::Stability;
@@ -25,55 +21,52 @@ const CROSSING: &str = "no ribs found that do not cross: the bends, arcs and squ
 
 /// Finds a minimum of the energy in the two fields.
 pub(super) fn solve(
-    scenario: &Scenario,
-    belt: &Belt,
+    problem: &Problem,
     from: Start,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Equilibrium {
-    let assembly = Assembly::new(scenario, belt);
-    let (Found { program, solution }, status, message, twice) = match excess_distance(scenario) {
-        Some(message) => {
-            let found = start(scenario, &assembly);
-            (found, Status::Infeasible, message, None)
-        }
+    let (found, status, message, redundant) = match problem.unreachable_supports() {
+        Some(too_far) => (
+            start(problem),
+            Status::Infeasible,
+            too_far.to_string(),
+            None,
+        ),
         None => {
-            let (found, crossing) = find(scenario, &assembly, from, proceed);
-            let twice = said_twice(scenario, &found.program);
-            let (status, message) = judge(scenario, &found.solution, crossing, twice.as_deref());
-            (found, status, message, twice)
+            let (found, crossing) = find(problem, from, proceed);
+            let redundant = redundant(problem, &found.program);
+            let (status, message) = judge(problem, &found.solution, crossing, redundant.as_deref());
+            (found, status, message, redundant)
         }
     };
-    let found = Found { program, solution };
-    equilibrium(scenario, &assembly, found, status, message, twice)
+    equilibrium(problem, found, status, message, redundant)
 }
 
-/// The equilibrium of a solution that was found by other means; it has converged only where its ribs are apart.
-pub(super) fn of_solution(
-    scenario: &Scenario,
-    belt: &Belt,
+/// The equilibrium of a solution of a problem's programme that was found by other means; it has converged only where its
+/// ribs are apart.
+pub(crate) fn of_solution(
+    problem: &Problem,
     program: BeltProgram,
     solution: Solution<BeltPoint>,
 ) -> Equilibrium {
-    let assembly = Assembly::new(scenario, belt);
-    let twice = said_twice(scenario, &program);
-    let spine = assembly.spine(&program, &solution.at.point);
+    let redundant = redundant(problem, &program);
+    let spine = problem.spine(&program, &solution.at.point);
     let crossing = unsettled(&program, &spine).map(|element| spine.u[element]);
-    let (status, message) = judge(scenario, &solution, crossing, twice.as_deref());
+    let (status, message) = judge(problem, &solution, crossing, redundant.as_deref());
     let found = Found { program, solution };
-    equilibrium(scenario, &assembly, found, status, message, twice)
+    equilibrium(problem, found, status, message, redundant)
 }
 
 /// All that is to be known of where a search ended.
 fn equilibrium(
-    scenario: &Scenario,
-    assembly: &Assembly,
+    problem: &Problem,
     Found { program, solution }: Found,
     status: Status,
     message: String,
-    twice: Option<String>,
+    redundant: Option<String>,
 ) -> Equilibrium {
-    let units = assembly.units;
-    let spine = assembly.spine(&program, &solution.at.point);
+    let (scenario, units) = (problem.scenario(), problem.units());
+    let spine = problem.spine(&program, &solution.at.point);
     let half_turns = match status {
         Status::Converged => half_turns(&spine),
         Status::Infeasible | Status::NotConverged => None,
@@ -88,18 +81,18 @@ fn equilibrium(
         status,
         message,
         warnings: [
-            warnings(scenario, &program, status, stability, is_flat),
-            doubts(status, twice.as_deref()),
+            warnings(problem, &program, status, stability, is_flat),
+            doubts(status, redundant.as_deref()),
             passed_through_itself(scenario, half_turns),
         ]
         .concat(),
         half_turns,
-        energy: solution.values.objective * units.energy + assembly.potential_of_origin(),
+        energy: solution.values.objective * units.energy + problem.potential_of_origin(),
         elastic_energy: program.elastic_energy(&solution.at.point.fields) * units.energy,
         torsion: spine.torsion(),
         spine,
         internal: internal.into_iter().map(|w| units.wrench(w)).collect(),
-        reactions: reactions(scenario, &program, &solution, units),
+        reactions: reactions(problem, &program, &solution),
         links: links
             .take(scenario.links.len())
             .map(|force| LinkForce {
@@ -109,14 +102,12 @@ fn equilibrium(
         stability,
         residuals: solution.residuals,
         iterations: solution.iterations,
-        scenario: scenario.clone(),
+        problem: problem.clone(),
         solved: Some(Solved {
             program,
             at: solution.at,
             inertia: solution.inertia,
-            units,
-            origin: assembly.origin,
-            said_twice: twice,
+            redundant,
             is_flat,
         }),
     }
@@ -129,59 +120,53 @@ struct Found {
 }
 
 impl Search {
-    fn of(scenario: &Scenario) -> Self {
+    fn of(problem: &Problem) -> Self {
         Self {
-            bulge: Vector3::from(scenario.solver.bulge),
-            tolerance: scenario.solver.tolerance,
+            bulge: problem.bulge(),
+            tolerance: problem.tolerance(),
         }
     }
 }
 
 /// The start of a search that is known to find nothing.
-fn start(scenario: &Scenario, assembly: &Assembly) -> Found {
-    let program = assembly.program(scenario.elements());
-    let solution = Search::of(scenario).start(&program);
+fn start(problem: &Problem) -> Found {
+    let program = problem.program(problem.elements());
+    let solution = Search::of(problem).start(&program);
     Found { program, solution }
 }
 
 /// Searches; with the arc length where ribs still cross on the board, if they do.
 fn find(
-    scenario: &Scenario,
-    assembly: &Assembly,
+    problem: &Problem,
     from: Start,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> (Found, Option<f64>) {
-    let search = Search::of(scenario);
-    let mut program = assembly.program(scenario.elements());
+    let search = Search::of(problem);
+    let mut program = problem.program(problem.elements());
     let solution = match from {
         Start::Near(shape) => search.from(&program, shape.clone(), proceed),
         Start::Shape(shape) => search.only_from(&program, shape.clone(), COLD, proceed),
         Start::Close(shape) => search.only_from(&program, shape.clone(), CLOSE, proceed),
         Start::Guess => {
-            let finer = scenario.elements() > scenario.default_elements();
-            let coarse = finer.then(|| assembly.program(scenario.default_elements()));
+            let default = problem.scenario().default_elements();
+            let coarse = (problem.elements() > default).then(|| problem.program(default));
             search.run(&program, coarse.as_ref(), proceed)
         }
     };
-    let (solution, crossing) = keep_apart(assembly, &search, &mut program, solution, proceed);
+    let (solution, crossing) = keep_apart(problem, &search, &mut program, solution, proceed);
     (Found { program, solution }, crossing)
 }
 
-/// Whether the ribs of a shape are apart on the whole board, and held by no edge that they do not reach.
-pub(super) fn is_settled(
-    scenario: &Scenario,
-    belt: &Belt,
-    program: &BeltProgram,
-    point: &BeltPoint,
-) -> bool {
-    let spine = Assembly::new(scenario, belt).spine(program, point);
-    unsettled(program, &spine).is_none()
+/// Whether the ribs of a shape are apart on the whole board, and bounded by no edge that they do not reach.
+pub(crate) fn is_settled(problem: &Problem, program: &BeltProgram, point: &BeltPoint) -> bool {
+    unsettled(program, &problem.spine(program, point)).is_none()
 }
 
-/// The supports and links that hold the same twice over, by name; `None` where all are independent.
+/// The supports and links whose constraints are redundant, by name; `None` where all are independent.
 ///
 /// Two supports, one at either end of a belt that bends, always are.
-fn said_twice(scenario: &Scenario, program: &BeltProgram) -> Option<String> {
+fn redundant(problem: &Problem, program: &BeltProgram) -> Option<String> {
+    let scenario = problem.scenario();
     let rigid = program
         .pieces
         .iter()
@@ -191,8 +176,7 @@ fn said_twice(scenario: &Scenario, program: &BeltProgram) -> Option<String> {
         return None;
     }
     // In general position: some constraints depend on each other on the straight belt and nowhere else.
-    let bulge = Vector3::from(scenario.solver.bulge);
-    let general = disturb(program, &guess(program, &bulge), 0.3);
+    let general = disturb(program, &guess(program, &problem.bulge()), 0.3);
     let name = |i: usize| match i.checked_sub(program.supports.len()) {
         None if i < supports => Some(format!("supports[{i}]")),
         Some(link) if link < links => Some(format!("links[{link}]")),
@@ -207,12 +191,12 @@ fn said_twice(scenario: &Scenario, program: &BeltProgram) -> Option<String> {
 
 /// Status and message of a search that was not infeasible from the outset.
 fn judge(
-    scenario: &Scenario,
+    problem: &Problem,
     solution: &Solution<BeltPoint>,
     crossing: Option<f64>,
-    said_twice: Option<&str>,
+    redundant: Option<&str>,
 ) -> (Status, String) {
-    let tolerance = scenario.solver.tolerance;
+    let tolerance = problem.tolerance();
     let largest = solution.residuals.largest();
     let (iterations, violation) = (solution.iterations, solution.residuals.constraint);
     match solution.outcome {
@@ -230,7 +214,7 @@ fn judge(
         ),
         Outcome::LocallyInfeasible | Outcome::IterationLimit | Outcome::Stalled
             if let Some(names) =
-                said_twice.filter(|_| violation > tolerance.max(CLEARLY_MISSED)) =>
+                redundant.filter(|_| violation > tolerance.max(CLEARLY_MISSED)) =>
         {
             (
                 Status::Infeasible,
@@ -276,9 +260,9 @@ fn judge(
     }
 }
 
-/// What should be known of constraints that depend on each other before the reactions are relied on.
-fn doubts(status: Status, said_twice: Option<&str>) -> Vec<String> {
-    let names = said_twice.filter(|_| status == Status::Converged);
+/// What should be known of redundant constraints before the reactions are relied on.
+fn doubts(status: Status, redundant: Option<&str>) -> Vec<String> {
+    let names = redundant.filter(|_| status == Status::Converged);
     let said = names.map(|names| {
         format!("{names} hold the same twice over: what each of them bears is not determined")
     });
@@ -296,7 +280,7 @@ fn passed_through_itself(scenario: &Scenario, half_turns: Option<i32>) -> Vec<St
 }
 
 fn warnings(
-    scenario: &Scenario,
+    problem: &Problem,
     program: &BeltProgram,
     status: Status,
     stability: Option<Stability>,
@@ -305,12 +289,13 @@ fn warnings(
     // Strong twist makes facets of the scale of V, which longer elements cannot resolve.
     const SAFE: f64 = 8.0;
     const THICK: f64 = 0.25;
+    let scenario = problem.scenario();
     let shares = program
         .elements()
         .map(|(_, e)| e.length / (2.0 * e.half_width));
     let longest = shares.fold(0.0, f64::max);
     let coarse = longest * SAFE > 1.0 + 1e-9;
-    let taut = status != Status::Infeasible && is_taut(scenario);
+    let no_slack = status != Status::Infeasible && problem.has_no_slack();
     let flat = status == Status::Converged && is_flat;
     let weightless = scenario.loads.gravity.is_some_and(|g| g != [0.0; 3])
         && scenario.belt.density_value() == 0.0;
@@ -329,7 +314,7 @@ fn warnings(
                 (SAFE * scenario.belt.length() / scenario.belt.width).ceil()
             )
         }),
-        taut.then(|| {
+        no_slack.then(|| {
             "the supports leave the belt less than 1e-6 of slack: the reactions are not determined".to_owned()
         }),
         weightless.then(|| {
@@ -383,26 +368,17 @@ fn stability(
 }
 
 fn reactions(
-    scenario: &Scenario,
+    problem: &Problem,
     program: &BeltProgram,
     solution: &Solution<BeltPoint>,
-    units: Units,
 ) -> Vec<Reaction> {
+    let units = problem.units();
     let wrenches = program.reactions(&solution.at.point, &solution.at.multipliers.equalities);
-    let supports = scenario.supports.iter().zip(wrenches);
+    let supports = problem.scenario().supports.iter().zip(wrenches);
     supports
         .map(|(support, wrench)| Reaction {
             at: support.at.arc_length(units.length),
             wrench: units.wrench(wrench),
         })
         .collect()
-}
-
-impl Units {
-    pub(crate) fn wrench(&self, (force, moment): (Vector3<f64>, Vector3<f64>)) -> Wrench {
-        Wrench {
-            force: force * self.force(),
-            moment: moment * self.energy,
-        }
-    }
 }

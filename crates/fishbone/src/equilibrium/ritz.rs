@@ -1,34 +1,28 @@
 //! The source's own method, in the terms of an equilibrium.
 
-use super::{Equilibrium, Status, Units, excess_distance};
-use crate::belt::Belt;
+use super::{Equilibrium, Status};
 use crate::lie::{Pose, exp, log};
-use crate::ritz::{self, Options, Orientation, Problem, Side, Solution};
-use crate::scenario::{Scenario, SupportSpec};
+use crate::problem::Problem;
+use crate::ritz::{self, Options, Orientation, Side, Solution};
 use crate::spine::{Piece, Spine};
 use nalgebra::Vector3;
 use stagewise::Residuals;
 use std::ops::ControlFlow;
 
 /// Solves a belt clamped at both ends.
-///
-/// # Panics
-///
-/// If an end is not held in position and orientation.
 pub(super) fn solve(
-    scenario: &Scenario,
-    belt: &Belt,
+    problem: &Problem,
+    [start, end]: &[Pose; 2],
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Equilibrium {
-    let units = Units::of(belt);
-    let [start, end] = [0, 1].map(|i| held(&scenario.supports[i]));
-    let to_end = start.inverse() * end;
-    let problem = Problem {
-        width_over_length: belt.width / units.length,
-        end_position: to_end.position / units.length,
+    let (scenario, length) = (problem.scenario(), problem.units().length);
+    let to_end = start.inverse() * *end;
+    let clamped = ritz::Problem {
+        width_over_length: problem.belt().width / length,
+        end_position: to_end.position / length,
         end_orientation: Orientation::as_in_source(&to_end.frame),
         energy: scenario.energy,
-        bulge: side(&start, &to_end, &Vector3::from(scenario.solver.bulge)),
+        bulge: side(start, &to_end, &problem.bulge()),
     };
     let spec = &scenario.solver.ritz;
     let options = Options {
@@ -37,15 +31,8 @@ pub(super) fn solve(
         penalty: spec.penalty,
         updates: spec.updates,
     };
-    let solution = ritz::solve(&problem, &options, proceed);
-    report(scenario, belt, &start, &solution)
-}
-
-fn held(support: &SupportSpec) -> Pose {
-    Pose {
-        frame: support.frame().expect("a validated scenario"),
-        position: support.point().expect("a validated scenario"),
-    }
+    let solution = ritz::solve(&clamped, &options, proceed);
+    report(problem, start, &solution)
 }
 
 /// The side of the start frame on which the bulge lies, judged by the normal half way to the end.
@@ -58,9 +45,9 @@ fn side(start: &Pose, to_end: &Pose, bulge: &Vector3<f64>) -> Side {
     }
 }
 
-fn report(scenario: &Scenario, belt: &Belt, start: &Pose, solution: &Solution) -> Equilibrium {
-    let units = Units::of(belt);
-    let count = scenario.elements();
+fn report(problem: &Problem, start: &Pose, solution: &Solution) -> Equilibrium {
+    let units = problem.units();
+    let count = problem.elements();
     let u: Vec<f64> = (0..=count).map(|k| k as f64 / count as f64).collect();
     let pose = |(u, position): (&f64, Vector3<f64>)| {
         *start
@@ -71,12 +58,12 @@ fn report(scenario: &Scenario, belt: &Belt, start: &Pose, solution: &Solution) -
     };
     let rate = |i: usize| u.iter().map(move |u| solution.rates(*u)[i] / units.length);
     let energy = solution.energy * units.energy;
-    let (status, message) = match excess_distance(scenario) {
-        Some(message) => (Status::Infeasible, message),
+    let (status, message) = match problem.unreachable_supports() {
+        Some(too_far) => (Status::Infeasible, too_far.to_string()),
         None => (Status::NotConverged, message(solution)),
     };
     Equilibrium {
-        scenario: scenario.clone(),
+        problem: problem.clone(),
         status,
         message,
         warnings: Vec::new(),
@@ -84,7 +71,7 @@ fn report(scenario: &Scenario, belt: &Belt, start: &Pose, solution: &Solution) -
         elastic_energy: energy,
         torsion: rate(1).collect(),
         spine: Spine {
-            width: belt.width,
+            width: problem.belt().width,
             pieces: vec![Piece::Strip { geodesic: 0.0 }; count],
             half_turns: None,
             pose: u.iter().zip(solution.positions(&u)).map(pose).collect(),

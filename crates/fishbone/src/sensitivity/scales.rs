@@ -3,9 +3,9 @@
 use super::data::{Data, HALF_WIDTH, NATURAL_BEND};
 use super::system::{Direction, System};
 use super::{Motion, Parameters};
-use crate::equilibrium::{Solved, Units};
 use crate::lie::gauss_points;
-use crate::scenario::Scenario;
+use crate::problem::{Problem, Units};
+use crate::program::BeltProgram;
 use nalgebra::Vector3;
 
 /// A linear map from parameters to what a programme is made of.
@@ -24,20 +24,19 @@ pub(super) struct Scales {
 }
 
 impl Scales {
-    pub(super) fn new(scenario: &Scenario, solved: &Solved) -> Self {
-        let (belt, units) = (&scenario.belt, solved.units);
-        let density = belt.density_value();
+    pub(super) fn new(problem: &Problem, program: &BeltProgram) -> Self {
+        let (belt, units) = (problem.belt(), problem.units());
         let ends = belt.segments.iter().scan(0.0, |end, segment| {
             *end += segment.length() / units.length;
             Some(*end)
         });
         let ends: Vec<f64> = ends.collect();
-        let nodes = solved.program.nodes();
+        let nodes = program.nodes();
         let middles = nodes.windows(2).map(|ends| 0.5 * (ends[0] + ends[1]));
         Self {
-            origin_by_gravity: -density * units.length * solved.origin,
-            weight: density * units.length / units.force(),
-            supports: scenario.supports.len(),
+            origin_by_gravity: -belt.density * units.length * problem.origin(),
+            weight: belt.density * units.length / units.force(),
+            supports: problem.scenario().supports.len(),
             segments: ends.len(),
             segment: middles
                 .map(|u| ends.partition_point(|end| *end < u).min(ends.len() - 1))

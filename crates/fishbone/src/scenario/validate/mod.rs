@@ -29,10 +29,7 @@ impl Scenario {
     /// Errors: the first thing wrong, with its field.
     pub fn validate(&self) -> Result<(), ScenarioError> {
         self.belt.check()?;
-        let extent = Extent {
-            length: self.belt.length(),
-            closed: self.belt.closed,
-        };
+        let extent = self.extent();
         check_supports(&self.supports, extent)?;
         check_links(&self.links, extent)?;
         self.loads.check(extent)?;
@@ -41,6 +38,20 @@ impl Scenario {
         match self.solver.method {
             Method::Intrinsic => Ok(()),
             Method::Ritz => self.check_ritz(extent.length),
+        }
+    }
+
+    /// Checks what a support of a valid scenario is to be replaced by, at the same place along the belt.
+    ///
+    /// Errors: the first thing wrong, with its field.
+    pub(crate) fn check_support(&self, i: usize, support: &SupportSpec) -> Check {
+        support.check(i, self.extent())
+    }
+
+    fn extent(&self) -> Extent {
+        Extent {
+            length: self.belt.length(),
+            closed: self.belt.closed,
         }
     }
 

@@ -64,7 +64,7 @@ pub(super) fn check_links(links: &[LinkSpec], extent: Extent) -> Check {
 }
 
 impl SupportSpec {
-    fn check(&self, i: usize, extent: Extent) -> Check {
+    pub(super) fn check(&self, i: usize, extent: Extent) -> Check {
         extent.check(format_args!("supports[{i}].at"), self.at)?;
         for (j, component) in self.position.iter().flatten().enumerate() {
             let value = component.value().unwrap_or(0.0);
@@ -86,16 +86,18 @@ impl SupportSpec {
     }
 
     fn check_orientation(&self, i: usize) -> Check {
-        let given = given(&[
+        let sources = [
             ("rotation", self.rotation.is_some()),
             ("euler", self.euler.is_some()),
             ("quaternion", self.quaternion.is_some()),
-        ]);
-        require(given.len() <= 1, format_args!("supports[{i}]"), || {
-            (given.join(" and "), format!("given {ORIENTATIONS}"))
+        ];
+        let count = sources.iter().filter(|(_, is_given)| *is_given).count();
+        require(count <= 1, format_args!("supports[{i}]"), || {
+            let given = given(&sources).join(" and ");
+            (given, format!("given {ORIENTATIONS}"))
         })?;
         require(
-            self.hinge.is_none() || !given.is_empty(),
+            self.hinge.is_none() || count > 0,
             format_args!("supports[{i}].hinge"),
             || {
                 (

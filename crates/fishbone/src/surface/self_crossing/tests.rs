@@ -172,7 +172,8 @@ fn test_closed_rings_do_not_cross_at_their_seam() {
 fn test_moebius_band_does_not_cross_itself() {
     let text = include_str!("../../../../../scenarios/mobius.toml");
     let scenario = crate::scenario::Scenario::from_toml(text).unwrap();
-    let band = crate::equilibrium::solve(&scenario, &mut || std::ops::ControlFlow::Continue(()));
+    let problem = crate::problem::Problem::new(scenario).unwrap();
+    let band = crate::equilibrium::solve(&problem, &mut || std::ops::ControlFlow::Continue(()));
     assert_eq!(band.spine.half_turns.map(|n| n % 2), Some(1));
     assert_eq!(crosses_itself(&band.spine), None);
 }

@@ -1,41 +1,22 @@
 //! From a scenario to a programme: which node everything acts on, lengths in U and energy in mean R_f/U.
 
-use super::Units;
-use crate::belt::{Belt, Break};
+use super::Problem;
+use crate::belt::Break;
 use crate::lie::Pose;
 use crate::program::{
     self, BeltPoint, BeltProgram, DeadForce, Hold, NodeLink, NodeLoad, NodeSupport, Tie,
 };
-use crate::scenario::{Axis, Place, SAME_PLACE, Scenario, SupportSpec};
+use crate::scenario::{Axis, Place, SAME_PLACE, SupportSpec};
 use crate::spine::{Piece, Spine};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use std::f64::consts::PI;
 
-/// What a programme is assembled from.
-pub(super) struct Assembly<'a> {
-    scenario: &'a Scenario,
-    belt: &'a Belt,
-    pub(super) units: Units,
-    /// Where the programme has its origin, so that a belt far from the world's loses no digits: at the first support.
-    pub(super) origin: Vector3<f64>,
-}
-
-impl<'a> Assembly<'a> {
-    pub(super) fn new(scenario: &'a Scenario, belt: &'a Belt) -> Self {
-        let first = |i: usize| scenario.supports.iter().find_map(|s| s.components()[i]);
-        Self {
-            scenario,
-            belt,
-            units: Units::of(belt),
-            origin: Vector3::from([0, 1, 2].map(|i| first(i).unwrap_or(0.0))),
-        }
-    }
-
-    /// The programme on a mesh of about `count` elements.
+impl Problem {
+    /// The programme on a mesh of about `count` elements, no rib bounded by edges beyond those of its own stretch.
     ///
     /// Its supports are those of the scenario in their order, or one at the start where there is none; its links are
     /// those of the scenario, then the seam of a closed belt.
-    pub(super) fn program(&self, count: usize) -> BeltProgram {
+    pub fn program(&self, count: usize) -> BeltProgram {
         self.program_of(self.belt.pieces(count, &self.breaks()))
     }
 
@@ -74,8 +55,8 @@ impl<'a> Assembly<'a> {
         program
     }
 
-    /// The spine of a shape, in the units of the scenario.
-    pub(super) fn spine(&self, program: &BeltProgram, point: &BeltPoint) -> Spine {
+    /// The spine of a shape of one of the problem's programmes, in the units of the scenario.
+    pub fn spine(&self, program: &BeltProgram, point: &BeltPoint) -> Spine {
         let length = self.units.length;
         let pose = |pose: &Pose| Pose {
             frame: pose.frame,
@@ -101,7 +82,7 @@ impl<'a> Assembly<'a> {
     }
 
     /// What the potential of the loads lacks for its zero to be at the world's origin and not at the programme's.
-    pub(super) fn potential_of_origin(&self) -> f64 {
+    pub(crate) fn potential_of_origin(&self) -> f64 {
         let gravity = Vector3::from(self.scenario.loads.gravity.unwrap_or_default());
         let weight = gravity * self.belt.density * self.belt.length();
         let forces = self.scenario.loads.points.iter();

@@ -1,0 +1,246 @@
+//! A belt problem: a validated scenario with its belt, its units and its origin. All that is computed starts from one.
+//!
+//! A [`Problem`] can only be made of a scenario that [`Scenario::validate`] passes, and cannot be changed afterwards: a problem
+//! with other numbers is another problem, validated in its turn.
+
+mod assembly;
+mod mesh;
+mod reach;
+#[cfg(test)]
+mod tests;
+mod units;
+
+use crate::belt::Belt;
+use crate::error::ScenarioError;
+use crate::lie::{Pose, log};
+use crate::scenario::{Component, Method, Scenario, SupportSpec};
+use nalgebra::{Matrix3, Vector3};
+use std::sync::Arc;
+
+pub(crate) use mesh::Mesh;
+pub use reach::OutOfReach;
+pub(crate) use reach::number;
+pub use units::Units;
+
+/// How far the products of a frame's columns may be off those of a rotation.
+const ROTATION_TOLERANCE: f64 = 1e-6;
+
+/// A validated scenario, with the belt that it describes, the units of its programme and where that has its origin.
+///
+/// A clone shares the scenario and the belt.
+///
+/// ```
+/// use fishbone::{problem::Problem, scenario::Scenario};
+///
+/// let mut scenario = Scenario::from_toml(
+///     r#"
+///     belt = { width = 0.1, rigidity = 2.0, segments = [{ kind = "straight", length = 0.5 }] }
+///     supports = [{ at = "end", position = [0, 0.3, 0] }]
+///     "#,
+/// )?;
+/// let problem = Problem::new(scenario.clone())?;
+/// assert_eq!(problem.units().energy, 2.0 / 0.5);
+///
+/// scenario.belt.width = -0.1;
+/// let refused = Problem::new(scenario).unwrap_err();
+/// assert_eq!(refused.to_string(), "belt.width: found -0.1, must be a positive finite number");
+/// # Ok::<(), fishbone::error::ScenarioError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Problem {
+    scenario: Arc<Scenario>,
+    belt: Arc<Belt>,
+    units: Units,
+    /// Where the programme has its origin, world axes, so that a belt far from the world's loses no digits: at the first
+    /// support.
+    origin: Vector3<f64>,
+    formulation: Formulation,
+}
+
+/// The method of solution, with what it takes beyond the belt.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Formulation {
+    /// Bend and rib slope as the only unknowns.
+    Intrinsic,
+    /// The source's own, for a belt clamped at both ends.
+    Ritz {
+        /// Poses of the start and of the end.
+        ends: [Pose; 2],
+    },
+}
+
+impl Formulation {
+    fn of(scenario: &Scenario) -> Result<Self, ScenarioError> {
+        match scenario.solver.method {
+            Method::Intrinsic => Ok(Self::Intrinsic),
+            Method::Ritz => match [0, 1].map(|support| clamp(scenario, support)) {
+                [Some(start), Some(end)] => Ok(Self::Ritz { ends: [start, end] }),
+                _ => Err(ScenarioError::invalid(
+                    "solver.method",
+                    "\"ritz\" with an end that is not clamped",
+                    "\"intrinsic\", or have both ends clamped",
+                )),
+            },
+        }
+    }
+}
+
+impl Problem {
+    /// The problem of a scenario.
+    ///
+    /// Supports that no shape of the belt can meet are no error: that is an outcome of a solve.
+    ///
+    /// # Errors
+    ///
+    /// The first thing wrong with the scenario, with its field, as [`Scenario::validate`] finds it.
+    pub fn new(scenario: Scenario) -> Result<Self, ScenarioError> {
+        scenario.validate()?;
+        let belt = Belt::new(&scenario.belt)?;
+        Self::of(scenario, Arc::new(belt))
+    }
+
+    /// The same problem on a mesh of another number of elements.
+    ///
+    /// # Errors
+    ///
+    /// [`ScenarioError`] where a scenario may not have so many elements, or so few.
+    pub fn with_elements(&self, elements: usize) -> Result<Self, ScenarioError> {
+        let mut scenario = Scenario::clone(&self.scenario);
+        scenario.solver.elements = Some(elements);
+        self.on_the_same_belt(scenario)
+    }
+
+    /// The same problem with a support, given by its place in the scenario, held at another pose.
+    ///
+    /// Units: those of the scenario.
+    ///
+    /// # Errors
+    ///
+    /// [`ScenarioError`] where there is no such support, and where it may not be held at the pose: a frame that is no
+    /// rotation, a position that is not finite or too many lengths of the belt away.
+    pub fn with_support_pose(&self, support: usize, pose: &Pose) -> Result<Self, ScenarioError> {
+        let moved = self.moved(support, pose)?;
+        let mut scenario = Scenario::clone(&self.scenario);
+        scenario.supports[support] = moved;
+        self.on_the_same_belt(scenario)
+    }
+
+    /// The same problem with the origin of its programmes elsewhere, world axes.
+    pub(crate) fn about(self, origin: Vector3<f64>) -> Self {
+        Self { origin, ..self }
+    }
+
+    /// Checks a pose for a support as [`Self::with_support_pose`] does, without making the problem: nothing is allocated.
+    pub(crate) fn check_support_pose(
+        &self,
+        support: usize,
+        pose: &Pose,
+    ) -> Result<(), ScenarioError> {
+        let moved = self.moved(support, pose)?;
+        self.scenario.check_support(support, &moved)
+    }
+
+    /// A support held at another pose.
+    fn moved(&self, support: usize, pose: &Pose) -> Result<SupportSpec, ScenarioError> {
+        let Some(held) = self.scenario.supports.get(support) else {
+            return Err(ScenarioError::invalid(
+                format!("supports[{support}]"),
+                "nothing",
+                "a support of the scenario",
+            ));
+        };
+        if !is_rotation(&pose.frame) {
+            return Err(ScenarioError::invalid(
+                format!("supports[{support}].rotation"),
+                "a frame that is no rotation",
+                "a right-handed frame of columns of length 1 that are square to each other",
+            ));
+        }
+        Ok(SupportSpec {
+            position: Some([0, 1, 2].map(|i| Component::Held(pose.position[i]))),
+            rotation: Some(log(&pose.frame).into()),
+            euler: None,
+            quaternion: None,
+            ..held.clone()
+        })
+    }
+
+    /// The problem of a scenario that differs from this one's in nothing of the belt.
+    fn on_the_same_belt(&self, scenario: Scenario) -> Result<Self, ScenarioError> {
+        scenario.validate()?;
+        Self::of(scenario, Arc::clone(&self.belt))
+    }
+
+    /// The problem of a validated scenario and its belt.
+    fn of(scenario: Scenario, belt: Arc<Belt>) -> Result<Self, ScenarioError> {
+        let first = |i: usize| scenario.supports.iter().find_map(|s| s.components()[i]);
+        Ok(Self {
+            units: Units::of(&belt),
+            origin: Vector3::from([0, 1, 2].map(|i| first(i).unwrap_or(0.0))),
+            formulation: Formulation::of(&scenario)?,
+            scenario: Arc::new(scenario),
+            belt,
+        })
+    }
+
+    /// The scenario.
+    pub fn scenario(&self) -> &Scenario {
+        &self.scenario
+    }
+
+    /// The belt, in the units of the scenario.
+    pub fn belt(&self) -> &Belt {
+        &self.belt
+    }
+
+    /// The units of length and energy of the programme.
+    pub fn units(&self) -> Units {
+        self.units
+    }
+
+    /// Where its programmes have their origin, world axes: at the first support, unless a tracker has kept the origin while
+    /// that support moved. Units: those of the scenario.
+    pub fn origin(&self) -> Vector3<f64> {
+        self.origin
+    }
+
+    /// Number of elements, in all.
+    pub fn elements(&self) -> usize {
+        self.scenario.elements()
+    }
+
+    /// The direction along which the belt should bulge, world axes; of any length.
+    pub fn bulge(&self) -> Vector3<f64> {
+        Vector3::from(self.scenario.solver.bulge)
+    }
+
+    /// The largest residual of what counts as converged: lengths in U and energy in mean R_f/U.
+    pub fn tolerance(&self) -> f64 {
+        self.scenario.solver.tolerance
+    }
+
+    /// The pose at which a support, given by its place in the scenario, holds the belt; `None` where there is no such
+    /// support, or it leaves any part of the pose free. Units: those of the scenario.
+    pub fn clamp(&self, support: usize) -> Option<Pose> {
+        clamp(&self.scenario, support)
+    }
+
+    /// The method of solution.
+    pub(crate) fn formulation(&self) -> &Formulation {
+        &self.formulation
+    }
+}
+
+fn is_rotation(frame: &Matrix3<f64>) -> bool {
+    let off = frame.tr_mul(frame) - Matrix3::identity();
+    off.iter().all(|entry| entry.abs() <= ROTATION_TOLERANCE) && frame.determinant() > 0.0
+}
+
+fn clamp(scenario: &Scenario, support: usize) -> Option<Pose> {
+    let held = scenario.supports.get(support)?;
+    let held = Some(held).filter(|held| held.hinge.is_none())?;
+    Some(Pose {
+        frame: held.frame()?,
+        position: held.point()?,
+    })
+}

@@ -1,0 +1,171 @@
+use super::*;
+use crate::lie::exp;
+use crate::scenario::{Place, Rigidity, RigidityTable, SegmentSpec};
+use std::f64::consts::PI;
+
+fn scenario() -> Scenario {
+    Scenario::from_toml(
+        r#"
+        belt = { width = 0.1, rigidity = 2.0, segments = [{ kind = "straight", length = 1.0 }] }
+        supports = [
+          { at = "start", position = [3, 0, 0], rotation = [0, 0, 0] },
+          { at = "end", position = [3, 0.6, 0], euler = [0.1, 0, 0] },
+        ]
+        "#,
+    )
+    .unwrap()
+}
+
+fn problem() -> Problem {
+    Problem::new(scenario()).unwrap()
+}
+
+#[test]
+fn test_what_no_scenario_may_be_is_no_problem() {
+    type Spoil = fn(&mut Scenario);
+    let cases: [(&str, Spoil); 20] = [
+        ("belt.width", |s| s.belt.width = -0.1),
+        ("belt.width", |s| s.belt.width = 0.0),
+        ("belt.width", |s| s.belt.width = f64::NAN),
+        ("belt.segments", |s| s.belt.segments.clear()),
+        ("belt.segments", |s| {
+            s.belt.segments = vec![SegmentSpec::Rigid { length: 1.0 }];
+        }),
+        ("belt.segments[0].length", |s| {
+            s.belt.segments[0] = SegmentSpec::straight(-1.0);
+        }),
+        ("belt.segments[0].rigidity", |s| {
+            s.belt.segments[0] = SegmentSpec::Straight {
+                length: 1.0,
+                natural_bend: None,
+                rigidity: Some(Rigidity::Table(RigidityTable {
+                    u: Vec::new(),
+                    value: Vec::new(),
+                })),
+            };
+        }),
+        ("belt", |s| s.belt.rigidity = None),
+        ("belt.rigidity", |s| s.belt.rigidity = Some(f64::INFINITY)),
+        ("belt.density", |s| s.belt.density = -1.0),
+        ("belt.half_turns", |s| s.belt.half_turns = Some(1)),
+        ("supports[1].position[0]", |s| {
+            s.supports[1].position = Some([Component::Held(f64::NAN); 3]);
+        }),
+        ("supports[1].euler[2]", |s| {
+            s.supports[1].euler = Some([0.0, 0.0, f64::NAN]);
+        }),
+        ("supports[1].at", |s| {
+            s.supports[1].at = Place::ArcLength(7.0)
+        }),
+        ("supports[1].at", |s| s.supports.swap(0, 1)),
+        ("loads.gravity[0]", |s| {
+            s.loads.gravity = Some([f64::NAN; 3]);
+        }),
+        ("solver.elements", |s| s.solver.elements = Some(0)),
+        ("solver.tolerance", |s| s.solver.tolerance = 0.0),
+        ("solver.bulge", |s| s.solver.bulge = [0.0; 3]),
+        ("solver.method", |s| {
+            s.solver.method = Method::Ritz;
+            s.supports[1].position = None;
+        }),
+    ];
+    for (field, spoil) in cases {
+        let mut spoiled = scenario();
+        spoil(&mut spoiled);
+        let refused = Problem::new(spoiled).expect_err(field);
+        assert_eq!(refused.field(), Some(field), "{refused}");
+    }
+}
+
+#[test]
+fn test_units_are_length_and_mean_rigidity_over_it() {
+    let mut scenario = scenario();
+    scenario.belt.segments = vec![SegmentSpec::straight(4.0)];
+    let units = Problem::new(scenario).unwrap().units();
+    assert_eq!(
+        (units.length, units.energy, units.force()),
+        (4.0, 0.5, 0.125)
+    );
+}
+
+#[test]
+fn test_programme_has_its_origin_at_the_first_support() {
+    let problem = problem();
+    assert_eq!(problem.origin(), Vector3::new(3.0, 0.0, 0.0));
+    let program = problem.program(problem.elements());
+    assert_eq!(program.supports[1].position, [0.0, 0.6, 0.0].map(Some));
+}
+
+#[test]
+fn test_support_is_moved_to_a_pose_and_to_nothing_else() {
+    let pose = Pose {
+        frame: exp(&Vector3::new(0.3, -0.2, 0.1)),
+        position: Vector3::new(3.0, 0.5, 0.1),
+    };
+    let moved = problem().with_support_pose(1, &pose).unwrap();
+    let held = moved.clamp(1).unwrap();
+    assert!((held.frame - pose.frame).norm() < 1e-15);
+    assert_eq!(held.position, pose.position);
+    let mut back = moved.scenario().clone();
+    back.supports[1] = scenario().supports[1].clone();
+    assert_eq!(back, scenario());
+}
+
+#[test]
+fn test_pose_that_no_support_may_have_is_refused() {
+    let at = |x: f64, turn: f64| Pose {
+        frame: turn * exp(&Vector3::x()),
+        position: Vector3::new(x, 0.0, 0.0),
+    };
+    let cases = [
+        (0, at(f64::NAN, 1.0), "supports[0].position[0]"),
+        (1, at(f64::INFINITY, 1.0), "supports[1].position[0]"),
+        (1, at(1e7, 1.0), "supports[1].position[0]"),
+        (1, at(0.0, f64::NAN), "supports[1].rotation"),
+        (1, at(0.0, 0.9), "supports[1].rotation"),
+        (1, at(0.0, -1.0), "supports[1].rotation"),
+        (2, at(0.0, 1.0), "supports[2]"),
+    ];
+    for (support, pose, field) in cases {
+        let refused = problem().with_support_pose(support, &pose).unwrap_err();
+        assert_eq!(refused.field(), Some(field));
+        let checked = problem().check_support_pose(support, &pose);
+        assert_eq!(checked, Err(refused));
+    }
+    assert_eq!(problem().check_support_pose(1, &at(3.0, 1.0)), Ok(()));
+}
+
+#[test]
+fn test_mesh_of_another_number_of_elements_is_another_problem() {
+    let fine = problem().with_elements(200).unwrap();
+    assert_eq!((fine.elements(), problem().elements()), (200, 80));
+    let refused = problem().with_elements(3).unwrap_err();
+    assert_eq!(refused.field(), Some("solver.elements"));
+}
+
+#[test]
+fn test_clamp_holds_all_of_a_pose() {
+    let mut scenario = scenario();
+    scenario.supports[1].position =
+        Some([Component::Held(3.0), Component::Free, Component::Held(0.0)]);
+    let problem = Problem::new(scenario).unwrap();
+    assert_eq!(problem.clamp(0).unwrap().position.x, 3.0);
+    assert_eq!((problem.clamp(1), problem.clamp(2)), (None, None));
+}
+
+#[test]
+fn test_supports_out_of_reach_are_named_with_what_is_missing() {
+    assert_eq!(problem().unreachable_supports(), None);
+    let pose = Pose {
+        frame: exp(&(PI * Vector3::x())),
+        position: Vector3::new(3.0, 1.25, 0.0),
+    };
+    let apart = problem().with_support_pose(1, &pose).unwrap();
+    let too_far = apart.unreachable_supports().unwrap();
+    assert_eq!((too_far.distance, too_far.belt), (1.25, 1.0));
+    assert_eq!(
+        too_far.to_string(),
+        "supports[0] and supports[1], at u = 0 and u = 1, are 1.25 apart, 0.25 more than the belt between them (1); move them \
+         closer"
+    );
+}

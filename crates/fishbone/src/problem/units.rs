@@ -1,0 +1,37 @@
+//! The units of a programme.
+
+use crate::belt::Belt;
+use crate::lie::Wrench;
+use nalgebra::Vector3;
+
+/// Units of length and energy of a programme, in those of its scenario.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Units {
+    /// The length U of the belt.
+    pub length: f64,
+    /// The mean of the rigidity R_f over what bends, over U.
+    pub energy: f64,
+}
+
+impl Units {
+    /// Those of the programmes of a belt.
+    pub(super) fn of(belt: &Belt) -> Self {
+        Self {
+            length: belt.length(),
+            energy: belt.mean_rigidity() / belt.length(),
+        }
+    }
+
+    /// The unit of force: energy over length.
+    pub fn force(&self) -> f64 {
+        self.energy / self.length
+    }
+
+    /// A force and a moment of the programme in the units of the scenario.
+    pub(crate) fn wrench(&self, (force, moment): (Vector3<f64>, Vector3<f64>)) -> Wrench {
+        Wrench {
+            force: force * self.force(),
+            moment: moment * self.energy,
+        }
+    }
+}
