@@ -332,15 +332,28 @@ impl<const X: usize, const U: usize, const N: usize> Linearisation<X, U, N> {
 
     /// Adds the equalities' gradients, each times its multiplier.
     pub(crate) fn add_equality_gradients(&self, multipliers: &[f64], into: &mut [NodeVector<N>]) {
-        let (at, between) = multipliers.split_at(self.layout.equalities_at_nodes());
-        let mut rows = self.equalities_at.iter().zip(at);
-        for block in self.layout.equalities_at() {
-            let mut pull = NodeVector::zeros();
-            for (row, multiplier) in rows.by_ref().take(block.rows) {
-                pull += *multiplier * row;
-            }
+        let blocks = self.layout.equalities_at().iter();
+        for (block, pull) in blocks.zip(self.pulls_at(multipliers)) {
             into[block.at] += pull;
         }
+        self.add_gradients_between(multipliers, into);
+    }
+
+    /// The sum of the gradients of every block of equalities at a node, each times its multiplier.
+    fn pulls_at(&self, multipliers: &[f64]) -> impl Iterator<Item = NodeVector<N>> {
+        let mut rows = self.equalities_at.iter().zip(multipliers);
+        let blocks = self.layout.equalities_at().iter();
+        blocks.map(move |block| {
+            let rows = rows.by_ref().take(block.rows);
+            rows.fold(NodeVector::zeros(), |sum, (row, multiplier)| {
+                sum + *multiplier * row
+            })
+        })
+    }
+
+    /// Adds the gradients of the equalities between pairs, each times its multiplier.
+    fn add_gradients_between(&self, multipliers: &[f64], into: &mut [NodeVector<N>]) {
+        let between = &multipliers[self.layout.equalities_at_nodes()..];
         let mut rows = self.equalities_between.iter().zip(between);
         for block in self.layout.equalities_between() {
             let mut pulls = [NodeVector::zeros(); 2];
@@ -352,6 +365,30 @@ impl<const X: usize, const U: usize, const N: usize> Linearisation<X, U, N> {
                 into[*node] += pull;
             }
         }
+    }
+
+    /// Adds the left-hand side of the linearised stationarity: second derivatives along a step, and the gradients of slacks
+    /// and equalities, each times its multiplier.
+    pub(crate) fn add_stationarity(
+        &self,
+        step: &[NodeVector<N>],
+        equalities: &[f64],
+        inequalities: &[f64],
+        into: &mut [NodeVector<N>],
+    ) {
+        self.add_second_derivatives(step, into);
+        self.add_slack_gradients(|row| inequalities[row], into);
+        let blocks = self.layout.equalities_at().iter().enumerate();
+        for ((i, block), pull) in blocks.zip(self.pulls_at(equalities)) {
+            let hessian = &self.diagonal.nodes[self.terms[i]].hessian;
+            into[block.at] += pull + hessian * step[block.at];
+        }
+        let first = self.layout.equalities_at().len();
+        for (i, block) in self.layout.inequalities_at().iter().enumerate() {
+            let hessian = &self.diagonal.nodes[self.terms[first + i]].hessian;
+            into[block.at] += hessian * step[block.at];
+        }
+        self.add_gradients_between(equalities, into);
     }
 
     /// Change of every equality along a step.
@@ -371,12 +408,8 @@ impl<const X: usize, const U: usize, const N: usize> Linearisation<X, U, N> {
         }
     }
 
-    /// Adds the second derivatives of stages, states and single nodes along a step.
-    pub(crate) fn add_second_derivatives(
-        &self,
-        step: &[NodeVector<N>],
-        into: &mut [NodeVector<N>],
-    ) {
+    /// Adds the second derivatives of stages and states along a step.
+    fn add_second_derivatives(&self, step: &[NodeVector<N>], into: &mut [NodeVector<N>]) {
         let stages = self.chain.stages.iter().zip(&self.diagonal.controls);
         for (k, (stage, own)) in stages.enumerate() {
             let [first, second]: [SVector<f64, U>; 2] =
@@ -396,9 +429,6 @@ impl<const X: usize, const U: usize, const N: usize> Linearisation<X, U, N> {
         for (k, own) in self.diagonal.states.iter().enumerate() {
             let mut by_state = into[k].fixed_rows_mut::<X>(0);
             by_state += own * step[k].fixed_rows::<X>(0);
-        }
-        for term in &self.diagonal.nodes {
-            into[term.node] += term.hessian * step[term.node];
         }
     }
 

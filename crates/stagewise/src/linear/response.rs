@@ -326,9 +326,12 @@ impl<const X: usize, const U: usize, const N: usize> Response<X, U, N> {
     fn missed(&self, right: &Direction<N>, at: &Direction<N>) -> Direction<N> {
         let linear = self.linear();
         let mut missed = right.clone();
-        linear.add_second_derivatives(&at.nodes, &mut missed.nodes);
-        linear.add_slack_gradients(|row| at.inequalities[row], &mut missed.nodes);
-        linear.add_equality_gradients(&at.equalities, &mut missed.nodes);
+        linear.add_stationarity(
+            &at.nodes,
+            &at.equalities,
+            &at.inequalities,
+            &mut missed.nodes,
+        );
         let mut rates = vec![0.0; at.equalities.len()];
         linear.equality_rates(&at.nodes, &mut rates);
         for (missed, rate) in missed.equalities.iter_mut().zip(rates) {

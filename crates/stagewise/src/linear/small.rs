@@ -1,7 +1,7 @@
 //! Symmetric matrices of a few rows: inverse and inertia.
 
 use super::TooConcave;
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{DMatrix, SMatrix, SVector, SymmetricEigen};
 
 /// Inverse of a symmetric matrix with at most so many negative eigenvalues, and their number.
 ///
@@ -72,7 +72,10 @@ pub(super) fn invert_indefinite<const N: usize>(
     }
     let scale = SVector::<f64, N>::from_fn(|i, _| matrix.row(i).amax().sqrt().recip());
     let scaled = matrix.component_mul(&(scale * scale.transpose()));
-    let (values, vectors) = symmetric_eigen(&(0.5 * (scaled + scaled.transpose())));
+    let eigen = SymmetricEigen::new(DMatrix::from_fn(N, N, |i, j| {
+        0.5 * (scaled[(i, j)] + scaled[(j, i)])
+    }));
+    let values = &eigen.eigenvalues;
     let negative = values.iter().filter(|value| **value < 0.0).count();
     let floor = f64::EPSILON * values.amax();
     // The comparison is false for a NaN.
@@ -80,61 +83,13 @@ pub(super) fn invert_indefinite<const N: usize>(
     if negative > most || !regular {
         return Err(TooConcave);
     }
-    let mut inverse = SMatrix::<f64, N, N>::zeros();
-    for (value, vector) in values.iter().zip(vectors.column_iter()) {
-        inverse += vector * (vector.transpose() / *value);
-    }
+    let vectors = SMatrix::<f64, N, N>::from_fn(|i, j| eigen.eigenvectors[(i, j)]);
+    let inverses = SMatrix::from_diagonal(&SVector::from_fn(|i, _| 1.0 / values[i]));
+    let inverse = vectors * inverses * vectors.transpose();
     Ok((
         inverse.component_mul(&(scale * scale.transpose())),
         negative,
     ))
-}
-
-/// Eigenvalues and eigenvectors, as columns, of a symmetric matrix, by Jacobi's rotations.
-///
-/// Source: G. H. Golub and C. F. Van Loan, "Matrix Computations", 4th ed. (2013), Sec. 8.5
-fn symmetric_eigen<const N: usize>(
-    matrix: &SMatrix<f64, N, N>,
-) -> (SVector<f64, N>, SMatrix<f64, N, N>) {
-    const SWEEPS: usize = 60;
-    let mut a = *matrix;
-    let mut vectors = SMatrix::<f64, N, N>::identity();
-    for _ in 0..SWEEPS {
-        let mut is_diagonal = true;
-        for p in 0..N {
-            for q in p + 1..N {
-                let off = a[(p, q)];
-                if off.abs() <= f64::EPSILON * f64::EPSILON * (a[(p, p)] * a[(q, q)]).abs().sqrt()
-                    || off == 0.0
-                {
-                    continue;
-                }
-                is_diagonal = false;
-                let tau = (a[(q, q)] - a[(p, p)]) / (2.0 * off);
-                let tangent = tau.signum() / (tau.abs() + tau.hypot(1.0));
-                let cosine = tangent.hypot(1.0).recip();
-                let sine = tangent * cosine;
-                for k in 0..N {
-                    let (kp, kq) = (a[(k, p)], a[(k, q)]);
-                    a[(k, p)] = cosine * kp - sine * kq;
-                    a[(k, q)] = sine * kp + cosine * kq;
-                    let (kp, kq) = (vectors[(k, p)], vectors[(k, q)]);
-                    vectors[(k, p)] = cosine * kp - sine * kq;
-                    vectors[(k, q)] = sine * kp + cosine * kq;
-                }
-                for k in 0..N {
-                    let (pk, qk) = (a[(p, k)], a[(q, k)]);
-                    a[(p, k)] = cosine * pk - sine * qk;
-                    a[(q, k)] = sine * pk + cosine * qk;
-                }
-                (a[(p, q)], a[(q, p)]) = (0.0, 0.0);
-            }
-        }
-        if is_diagonal {
-            break;
-        }
-    }
-    (a.diagonal(), vectors)
 }
 
 #[cfg(test)]
@@ -150,9 +105,7 @@ mod tests {
     fn assert_inverse<const N: usize>(numbers: &[f64]) -> Result<(), TestCaseError> {
         let matrix = symmetric::<N>(numbers);
         let rows = std::array::from_fn(|i| std::array::from_fn(|j| matrix[(i, j)]));
-        let (values, vectors) = symmetric_eigen(&matrix);
-        let again = vectors * SMatrix::from_diagonal(&values) * vectors.transpose();
-        prop_assert!((again - matrix).amax() < 1e-12);
+        let values = DMatrix::from_fn(N, N, |i, j| matrix[(i, j)]).symmetric_eigenvalues();
         prop_assume!(values.iter().all(|value| value.abs() > 1e-3));
         let negative = values.iter().filter(|value| **value < 0.0).count();
         let (inverse, count) = invert::<N>(&rows, N).unwrap();
