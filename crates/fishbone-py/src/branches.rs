@@ -2,7 +2,7 @@
 
 use crate::equilibrium::{Equilibrium, SIGNAL_INTERVAL};
 use crate::scenario::Scenario;
-use fishbone::branches::{self as core, Watch};
+use fishbone::analysis::branches::{self as core, Watch};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use std::ops::ControlFlow;

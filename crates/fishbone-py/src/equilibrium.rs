@@ -4,11 +4,12 @@ use crate::array::{self, Grid, Points, Scalars, Triangles};
 use crate::scenario::Scenario;
 use crate::sensitivity::{Sensitivity, refused};
 use crate::tracker::Tracker;
+use fishbone::board::curve::Curve;
 use fishbone::equilibrium::{self, Status};
-use fishbone::lie::Wrench;
+use fishbone::geometry::Wrench;
 use fishbone::problem::Problem;
-use fishbone::spine::Piece;
-use fishbone::surface::{self, Curve, Rib};
+use fishbone::strip::spine::Piece;
+use fishbone::surface::{self, Rib};
 use nalgebra::{Vector2, Vector3, Vector6};
 use numpy::IntoPyArray;
 use pyo3::exceptions::PyValueError;
@@ -48,7 +49,7 @@ pub(crate) fn solve_from(
     let mut signals = Signals::new();
     let found = py.detach(|| {
         Equilibrium::try_of(|| {
-            equilibrium::solve_from(&scenario.0, &bend, &rib_slope, &mut || signals.proceed())
+            fishbone::solve::solve_from(&scenario.0, &bend, &rib_slope, &mut || signals.proceed())
         })
     });
     match signals.raised {
@@ -69,7 +70,7 @@ pub(crate) fn status_name(status: Status) -> &'static str {
 impl Equilibrium {
     /// Solves and takes the time.
     pub(crate) fn timed(problem: &Problem, proceed: &mut dyn FnMut() -> ControlFlow<()>) -> Self {
-        Self::of(|| equilibrium::solve(problem, proceed))
+        Self::of(|| fishbone::solve::solve(problem, proceed))
     }
 
     /// What was found.
@@ -376,7 +377,7 @@ impl Equilibrium {
         py: Python<'py>,
         tolerance: f64,
     ) -> (Points<'py>, Points<'py>, Vec<Points<'py>>) {
-        let outline = surface::outline(&self.solved.spine);
+        let outline = fishbone::board::outline::outline(&self.solved.spine);
         let [minus, plus] = [&outline.minus, &outline.plus]
             .map(|edge| array::flat_points(py, polyline(edge, tolerance)));
         let loops = outline.lines(tolerance).into_iter();
@@ -511,7 +512,7 @@ impl Equilibrium {
     fn modes<'py>(&self, py: Python<'py>, count: usize) -> PyResult<Vec<Mode<'py>>> {
         let modes = py.detach(|| self.solved.modes(count));
         let modes = modes.map_err(|error| PyValueError::new_err(error.to_string()))?;
-        let mode = |mode: fishbone::stability::Mode| {
+        let mode = |mode: fishbone::analysis::modes::Mode| {
             (
                 mode.eigenvalue,
                 array::points(py, mode.motion.iter().map(|motion| &motion.translation)),

@@ -3,8 +3,8 @@
 use crate::array::{self, Grid, Points, Scalars};
 use crate::equilibrium::{Equilibrium, Signals};
 use crate::scenario::Scenario;
-use fishbone::follow::{self as core, End, Settings, Summary};
-use fishbone::path::{self, Motion};
+use fishbone::analysis::continuation::{self as core, End, Settings, Summary};
+use fishbone::analysis::path::{self, Motion};
 use nalgebra::Vector3;
 use numpy::IntoPyArray;
 use pyo3::exceptions::PyValueError;

@@ -1,8 +1,8 @@
 //! `_core.Scenario`.
 
-use fishbone::error::ScenarioError;
 use fishbone::problem::Problem;
 use fishbone::scenario;
+use fishbone::scenario::error::ScenarioError;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 

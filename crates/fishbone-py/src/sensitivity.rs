@@ -1,8 +1,8 @@
 //! `_core.Sensitivity`.
 
 use crate::array::{self, Grid, Points, Scalars};
-use fishbone::lie::Wrench;
-use fishbone::sensitivity::{self, Change, Motion, NoSensitivity, Parameters};
+use fishbone::analysis::sensitivity::{self, Change, Motion, NoSensitivity, Parameters};
+use fishbone::geometry::Wrench;
 use nalgebra::Vector3;
 use numpy::ndarray::{ArrayView1, ArrayView2};
 use numpy::{IntoPyArray, PyReadonlyArray1, PyReadonlyArray2};

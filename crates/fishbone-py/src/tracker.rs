@@ -3,7 +3,7 @@
 use crate::array::{self, Grid, Points, Scalars};
 use crate::equilibrium::{Equilibrium, Signals, status_name};
 use crate::scenario::Scenario;
-use fishbone::tracker::{self, NoTracker};
+use fishbone::analysis::tracking::{self as core, NoTracker};
 use nalgebra::Vector3;
 use numpy::IntoPyArray;
 use pyo3::exceptions::PyValueError;
@@ -12,7 +12,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// An equilibrium that is followed while one of its supports moves.
 #[pyclass(frozen, module = "fishbone._core")]
-pub(crate) struct Tracker(Mutex<tracker::Tracker>);
+pub(crate) struct Tracker(Mutex<core::Tracker>);
 
 impl Tracker {
     /// Errors: `ValueError`, one line, where there is nothing to follow.
@@ -21,12 +21,12 @@ impl Tracker {
         support: usize,
     ) -> PyResult<Self> {
         let refused = |error: NoTracker| PyValueError::new_err(error.to_string());
-        tracker::Tracker::new(equilibrium, support)
+        core::Tracker::new(equilibrium, support)
             .map(|tracker| Self(Mutex::new(tracker)))
             .map_err(refused)
     }
 
-    fn lock(&self) -> MutexGuard<'_, tracker::Tracker> {
+    fn lock(&self) -> MutexGuard<'_, core::Tracker> {
         // An update that has panicked is not gone on with.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }

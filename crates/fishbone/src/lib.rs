@@ -1,14 +1,30 @@
 //! Equilibrium shapes of thin, inextensible belts by the fishbone model.
 //!
 //! A belt is described by its centre line (the *spine*) and the straight lines across it (the *ribs*); its
-//! shape is the least bending energy under the poses of its supports. One direction of flow:
-//! [`scenario`] → [`problem`] → [`program`] → [`solver`] → [`equilibrium`] → [`surface`].
+//! shape is the least bending energy under the poses of its supports. A [`scenario`] becomes a [`problem`], this an
+//! [`equilibrium`], about which the [`analysis`] finds out more; the minimisation is that of the crate `stagewise`.
+//!
+//! | room | what it knows |
+//! |---|---|
+//! | [`geometry`] | rotations, poses, twists |
+//! | [`strip`] | energy and motion of the strip between neighbouring ribs, Eq. (34) |
+//! | [`board`] | material, flat spine, outline, how ribs lie on the board |
+//! | [`surface`] | curvatures, ribs, meshes of the deformed surface, Eq. (5)–(31) |
+//! | [`scenario`] | the input: its schema, its checks |
+//! | [`problem`] | a validated scenario with belt, units, mesh and programme |
+//! | [`equilibrium`] | the search for a minimum, and its result |
+//! | [`ritz`] | the source's own method, Eq. (37)–(43), as history |
+//! | [`solve`] | from a problem to an equilibrium, by the method asked for |
+//! | [`analysis`] | modes, derivatives, tracking, continuation, margins, all equilibria |
+//! | [`io`] | results as JSON |
+//!
+//! Every room uses only those above it in this table; a test keeps it so.
 //!
 //! Equation numbers, as in `Eq. (34)`, are those of Wakamatsu, Arai and Hirai, "Fishbone Model for Belt Object
 //! Deformation".
 //!
 //! ```
-//! use fishbone::{equilibrium::solve, problem::Problem, scenario::Scenario};
+//! use fishbone::{problem::Problem, scenario::Scenario, solve::solve};
 //! use std::ops::ControlFlow;
 //!
 //! // A belt whose ends face each other at 0.6 of its length: the planar elastica.
@@ -25,31 +41,17 @@
 //! let equilibrium = solve(&problem, &mut || ControlFlow::Continue(()));
 //! assert!((equilibrium.energy - 17.6586).abs() < 1e-4);
 //! assert!((equilibrium.highest_point().position.x - 0.3487).abs() < 1e-4);
-//! # Ok::<(), fishbone::error::ScenarioError>(())
+//! # Ok::<(), fishbone::scenario::error::ScenarioError>(())
 //! ```
 
-pub mod belt;
-pub mod branches;
-pub mod element;
-pub mod energy;
+pub mod analysis;
+pub mod board;
 pub mod equilibrium;
-pub mod error;
-pub mod follow;
-mod guess;
-pub mod lie;
-pub mod linking;
-pub mod margin;
-pub mod material;
-pub mod path;
+pub mod geometry;
+pub mod io;
 pub mod problem;
-pub mod program;
-pub mod result;
 pub mod ritz;
 pub mod scenario;
-pub mod sensitivity;
-pub mod spine;
-pub mod stability;
+pub mod solve;
 pub mod strip;
 pub mod surface;
-pub mod tracker;
-mod twins;

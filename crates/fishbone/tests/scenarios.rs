@@ -1,10 +1,11 @@
 //! The shipped scenarios, solved: the golden cases of every suite.
 
-use fishbone::equilibrium::{Equilibrium, NoShape, Status, Uncertified, solve, solve_from};
+use fishbone::analysis::modes::NoModes;
+use fishbone::analysis::sensitivity::NoSensitivity;
+use fishbone::equilibrium::{Equilibrium, Status, Uncertified};
 use fishbone::problem::Problem;
 use fishbone::scenario::Scenario;
-use fishbone::sensitivity::NoSensitivity;
-use fishbone::stability::NoModes;
+use fishbone::solve::{NoShape, solve, solve_from};
 use std::ops::ControlFlow;
 
 fn solved(text: &str) -> Equilibrium {

@@ -1,9 +1,10 @@
 //! Following an equilibrium from Rust: what it costs, and where it leads.
 
-use fishbone::equilibrium::{Equilibrium, Status, Uncertified, solve};
+use fishbone::analysis::tracking::{NoTracker, Tracker, Update};
+use fishbone::equilibrium::{Equilibrium, Status, Uncertified};
 use fishbone::problem::Problem;
 use fishbone::scenario::Scenario;
-use fishbone::tracker::{NoTracker, Tracker, Update};
+use fishbone::solve::solve;
 use nalgebra::Vector3;
 use std::ops::ControlFlow;
 

@@ -6,12 +6,12 @@
 //! does not reach.
 
 use super::search::Search;
-use crate::element::Element;
+use crate::board::reach::{crossings, further_edges};
 use crate::problem::Problem;
-use crate::program::{BeltPoint, BeltProgram, Piece};
-use crate::spine::Spine;
-use crate::strip::{Edge, FURTHER};
-use crate::surface::{crossings, further_edges};
+use crate::problem::program::{BeltPoint, BeltProgram, Piece};
+use crate::strip::element::Element;
+use crate::strip::ribs::{Edge, FURTHER};
+use crate::strip::spine::Spine;
 use stagewise::{Outcome, Solution};
 use std::ops::ControlFlow;
 

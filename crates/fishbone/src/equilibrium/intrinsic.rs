@@ -2,13 +2,13 @@
 
 use super::apart::{keep_apart, unsettled};
 use super::search::{CLOSE, COLD, Search, is_flat_under_load};
+use super::stability::Stability;
 use super::{Equilibrium, LinkForce, Reaction, Solved, Start, Status};
-use crate::guess::{disturb, guess};
-use crate::linking::half_turns;
+use crate::equilibrium::guess::{disturb, guess};
+use crate::problem::program::{self, BeltPoint, BeltProgram, ROWS};
 use crate::problem::{Problem, number};
-use crate::program::{self, BeltPoint, BeltProgram, ROWS};
 use crate::scenario::{Scenario, SupportSpec};
-use crate::stability::Stability;
+use crate::surface::linking::half_turns;
 use nalgebra::Vector3;
 use stagewise::{Inertia, Outcome, Solution, redundant_equalities};
 use std::ops::ControlFlow;

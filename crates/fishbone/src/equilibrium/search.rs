@@ -1,9 +1,9 @@
 //! The search for a minimum: where it starts, and where it starts again.
 
-use crate::energy::EnergyModel;
-use crate::guess::{buckle, disturb, guess, inside, is_flat, ring};
-use crate::program::{BeltPoint, BeltProgram, Piece};
+use crate::equilibrium::guess::{buckle, disturb, guess, inside, is_flat, ring};
+use crate::problem::program::{BeltPoint, BeltProgram, Piece};
 use crate::scenario::SAME_PLACE;
+use crate::strip::density::EnergyModel;
 use nalgebra::{Vector2, Vector3};
 use stagewise::{Outcome, Program, Settings, Solution};
 use std::f64::consts::PI;

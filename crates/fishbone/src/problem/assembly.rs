@@ -1,13 +1,13 @@
 //! From a scenario to a programme: which node everything acts on, lengths in U and energy in mean R_f/U.
 
 use super::Problem;
-use crate::belt::Break;
-use crate::lie::Pose;
-use crate::program::{
+use crate::geometry::Pose;
+use crate::problem::belt::Break;
+use crate::problem::program::{
     self, BeltPoint, BeltProgram, DeadForce, Hold, NodeLink, NodeLoad, NodeSupport, Tie,
 };
 use crate::scenario::{Axis, Place, SAME_PLACE, SupportSpec};
-use crate::spine::{Piece, Spine};
+use crate::strip::spine::{Piece, Spine};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use std::f64::consts::PI;
 

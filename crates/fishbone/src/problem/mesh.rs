@@ -1,8 +1,8 @@
 //! A mesh that stays the same while the numbers of a problem change.
 
 use super::Problem;
-use crate::program::{BeltProgram, Piece};
-use crate::strip::{Edge, FURTHER};
+use crate::problem::program::{BeltProgram, Piece};
+use crate::strip::ribs::{Edge, FURTHER};
 
 /// The mesh of a solution, and the edges that bound its ribs: what stays the same while the solution is continued.
 #[derive(Debug, Clone)]

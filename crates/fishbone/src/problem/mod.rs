@@ -4,15 +4,17 @@
 //! with other numbers is another problem, validated in its turn.
 
 mod assembly;
+pub mod belt;
 mod mesh;
+pub mod program;
 mod reach;
 #[cfg(test)]
 mod tests;
 mod units;
 
-use crate::belt::Belt;
-use crate::error::ScenarioError;
-use crate::lie::{Pose, log};
+use crate::geometry::{Pose, log};
+use crate::problem::belt::Belt;
+use crate::scenario::error::ScenarioError;
 use crate::scenario::{Component, Method, Scenario, SupportSpec};
 use nalgebra::{Matrix3, Vector3};
 use std::sync::Arc;

@@ -1,5 +1,5 @@
 use super::*;
-use crate::lie::exp;
+use crate::geometry::exp;
 use crate::scenario::{Place, Rigidity, RigidityTable, SegmentSpec};
 use std::f64::consts::PI;
 

@@ -1,7 +1,7 @@
 //! The units of a programme.
 
-use crate::belt::Belt;
-use crate::lie::Wrench;
+use crate::geometry::Wrench;
+use crate::problem::belt::Belt;
 use nalgebra::Vector3;
 
 /// Units of length and energy of a programme, in those of its scenario.

@@ -2,8 +2,8 @@
 
 use super::Orientation;
 use super::basis::LOCALS;
-use crate::energy::{Curl, EnergyModel};
-use crate::strip::Across;
+use crate::strip::density::{Curl, EnergyModel};
+use crate::strip::ribs::Across;
 use nalgebra::{Matrix3, SVector};
 use num_dual::DualNum;
 

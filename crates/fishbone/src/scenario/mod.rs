@@ -2,6 +2,7 @@
 //!
 //! Any consistent set of units serves; SI is assumed in the words below. Angles are in radians.
 
+pub mod error;
 mod node;
 mod parse;
 #[cfg(test)]
@@ -9,10 +10,9 @@ mod tests;
 mod untagged;
 mod validate;
 
-pub use crate::energy::EnergyModel;
-use crate::lie::{self, Euler};
-use crate::material::{Laminate, Layer, Material};
-use crate::ritz::Options;
+use crate::board::material::{Laminate, Layer, Material};
+use crate::geometry::{Euler, exp, frame_from_euler};
+pub use crate::strip::density::EnergyModel;
 pub use parse::{LONGEST_JSON, LONGEST_TOML};
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
@@ -365,17 +365,11 @@ pub struct RitzSpec {
 
 impl Default for RitzSpec {
     fn default() -> Self {
-        let Options {
-            basis,
-            points,
-            penalty,
-            updates,
-        } = Options::default();
         Self {
-            basis,
-            points,
-            penalty,
-            updates,
+            basis: 10,
+            points: 16,
+            penalty: 1e2,
+            updates: 1,
         }
     }
 }
@@ -653,10 +647,10 @@ impl SupportSpec {
     /// Source: Eq. (1) for `euler`.
     pub fn frame(&self) -> Option<Matrix3<f64>> {
         if let Some(vector) = self.rotation {
-            return Some(lie::exp(&Vector3::from(vector)));
+            return Some(exp(&Vector3::from(vector)));
         }
         if let Some([phi, theta, psi]) = self.euler {
-            return Some(lie::frame_from_euler(&Euler { phi, theta, psi }));
+            return Some(frame_from_euler(&Euler { phi, theta, psi }));
         }
         let [w, x, y, z] = self.quaternion?;
         let quaternion = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));

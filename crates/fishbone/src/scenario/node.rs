@@ -3,7 +3,7 @@
 //! Serde's own readers of TOML and JSON turn errors into text before the path of the field is known; reading from a
 //! tree of our own keeps them as data, and gives both formats one set of messages.
 
-use crate::error::ScenarioError;
+use crate::scenario::error::ScenarioError;
 use serde::Deserialize;
 use serde::de::{
     self, DeserializeSeed, Deserializer, Expected, IntoDeserializer, Unexpected, Visitor,

@@ -2,7 +2,7 @@
 
 use super::Scenario;
 use super::node::Node;
-use crate::error::ScenarioError;
+use crate::scenario::error::ScenarioError;
 use serde::Deserialize;
 
 /// Longest TOML text read, in bytes. Its reader takes up to 240 bytes of memory for each, so that this bounds the

@@ -1,7 +1,7 @@
 //! Facts of the schema: what is read, what is refused, and in which words.
 
 use super::*;
-use crate::error::ScenarioError;
+use crate::scenario::error::ScenarioError;
 use approx::assert_relative_eq;
 use proptest::prelude::*;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_6};
@@ -123,7 +123,7 @@ fn scenarios_in_the_documentation_are_valid() {
 #[test]
 fn materials_in_the_documentation_are_those_of_the_code() {
     let page = include_str!("../../../../docs/scenario.md");
-    for (name, material) in crate::material::PRESETS {
+    for (name, material) in crate::board::material::PRESETS {
         let (young, poisson) = (material.young / 1e9, material.poisson);
         let density = material.density.unwrap();
         let row = format!("| `{name}` | {young} | {poisson} | {density} |");

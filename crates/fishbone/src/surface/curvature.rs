@@ -1,8 +1,8 @@
 //! Fundamental forms and curvatures.
 
 use super::rib_angle;
-use crate::element::torsion;
-use crate::spine::Spine;
+use crate::strip::element::torsion;
+use crate::strip::spine::Spine;
 use nalgebra::{Matrix3, Vector3};
 
 /// Coefficients of the first fundamental form.
@@ -165,7 +165,7 @@ pub fn curvature(bend: f64, rib_slope: f64) -> f64 {
 ///
 /// Source: Eq. (14), (15); on the spine the second and third also give ∂η/∂v = ∂ζ/∂u, where the source prints ∂ξ/∂v
 pub fn frame_derivative(frame: &Matrix3<f64>, rates: &Vector3<f64>) -> Matrix3<f64> {
-    frame * crate::lie::hat(rates)
+    frame * crate::geometry::hat(rates)
 }
 
 /// Radius of bend at the point v of a rib, `(1 − v s)/|κ₁|`; infinite where κ₁ = 0.
@@ -200,7 +200,7 @@ impl Spine {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::surface::samples::spine;
+    use crate::board::samples::spine;
     use approx::assert_relative_eq;
     use proptest::prelude::*;
 
@@ -292,7 +292,7 @@ mod tests {
         let h = 1e-4;
         let difference = (spine.at(0.5 + h).pose.frame - spine.at(0.5 - h).pose.frame) / (2.0 * h);
         let here = spine.at(0.5);
-        let rates = crate::element::strain(0.0, here.bend, here.rib_slope).rotation;
+        let rates = crate::strip::element::strain(0.0, here.bend, here.rib_slope).rotation;
         assert_relative_eq!(
             frame_derivative(&here.pose.frame, &rates),
             difference,

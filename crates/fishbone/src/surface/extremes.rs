@@ -1,9 +1,9 @@
 //! Highest point, tightest bend, narrowest margin.
 
-use super::board::Board;
 use super::curvature::{bend_radius, curvature};
-use super::rib::{rib_convergence, rib_convergence_bound};
-use crate::spine::{Piece, Spine, SpinePoint};
+use crate::board::feet::Board;
+use crate::strip::ribs::rib_convergence_bound;
+use crate::strip::spine::{Spine, SpinePoint};
 use nalgebra::Vector3;
 
 /// The farthest point of the spine along a direction.
@@ -121,7 +121,9 @@ const SAMPLES: usize = 8;
 /// The tightest point of a rib is the end towards which the ribs converge.
 pub fn least_bend_radius(spine: &Spine) -> Option<BendRadius> {
     let board = Board::of(spine);
-    let parts = strips(spine).flat_map(|element| smooth_parts(spine, &board, element));
+    let parts = spine
+        .strips()
+        .flat_map(|element| smooth_parts(spine, &board, element));
     let bends = parts.map(|part| tightest_in(spine, &board, part));
     let least = bends.min_by(|a, b| a.value.total_cmp(&b.value));
     least.filter(|bend| bend.value.is_finite())
@@ -149,26 +151,6 @@ fn smooth_parts(spine: &Spine, board: &Board, element: usize) -> Vec<Part> {
         .collect()
 }
 
-/// The flexible elements: neither joints, which have no length, nor stiffeners, which have no ribs.
-pub(super) fn strips(spine: &Spine) -> impl Iterator<Item = usize> {
-    (0..spine.elements()).filter(|&element| {
-        matches!(spine.pieces[element], Piece::Strip { .. }) && spine.element_length(element) > 0.0
-    })
-}
-
-/// s inside an element, at a point of given rib slope.
-fn convergence(spine: &Spine, element: usize, rib_slope: f64) -> f64 {
-    let rise = spine.rib_slope[element + 1] - spine.rib_slope[element];
-    let rate = rise / spine.element_length(element);
-    rib_convergence(rate, spine.pieces[element].geodesic(), rib_slope)
-}
-
-/// s in the middle of an element.
-pub(super) fn mean_convergence(spine: &Spine, element: usize) -> f64 {
-    let mean = 0.5 * (spine.rib_slope[element] + spine.rib_slope[element + 1]);
-    convergence(spine, element, mean)
-}
-
 fn tightest_in(spine: &Spine, board: &Board, part: Part) -> BendRadius {
     let radius = |distance: f64| tightest_on_rib(spine, board, part.element, distance);
     let step = (part.to - part.from) / SAMPLES as f64;
@@ -182,7 +164,7 @@ fn tightest_in(spine: &Spine, board: &Board, part: Part) -> BendRadius {
 
 fn tightest_on_rib(spine: &Spine, board: &Board, element: usize, distance: f64) -> BendRadius {
     let (bend, slope) = spine.fields(element, distance);
-    let s = convergence(spine, element, slope);
+    let s = spine.convergence(element, slope);
     let [minus, plus] = board.ends(&board.foot_within(spine, element, distance));
     let v = if s > 0.0 {
         plus.v
@@ -227,7 +209,7 @@ pub struct RibMargin {
 pub fn rib_margin(spine: &Spine) -> RibMargin {
     let bound = rib_convergence_bound(spine.width);
     let margin = |element: usize| RibMargin {
-        value: bound - mean_convergence(spine, element).abs(),
+        value: bound - spine.mean_convergence(element).abs(),
         u: 0.5 * (spine.u[element] + spine.u[element + 1]),
     };
     let start = RibMargin {
@@ -235,14 +217,15 @@ pub fn rib_margin(spine: &Spine) -> RibMargin {
         u: spine.u.first().copied().unwrap_or(0.0),
     };
     let narrower = |a: RibMargin, b: RibMargin| if b.value < a.value { b } else { a };
-    strips(spine).map(margin).fold(start, narrower)
+    spine.strips().map(margin).fold(start, narrower)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lie::Pose;
-    use crate::surface::samples::{spine, waves};
+    use crate::board::samples::{spine, waves};
+    use crate::geometry::Pose;
+    use crate::strip::spine::Piece;
     use approx::assert_relative_eq;
     use proptest::prelude::*;
 
@@ -395,7 +378,7 @@ mod tests {
                     let [a, b] = board.ends(&board.foot_at(&spine, u)).map(|end| end.v);
                     for j in 0..=4 {
                         let v = a + (b - a) * f64::from(j) / 4.0;
-                        let s = convergence(&spine, element, slope);
+                        let s = spine.convergence(element, slope);
                         let radius = bend_radius(curvature(bend, slope), s, v);
                         prop_assert!(radius >= least * (1.0 - 1e-9));
                     }

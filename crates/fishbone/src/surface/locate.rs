@@ -1,8 +1,8 @@
 //! Which part of the surface a flat point belongs to.
 
-use super::board::{Board, Foot};
 use super::patch::Polygon;
-use crate::spine::Spine;
+use crate::board::feet::{Board, Foot};
+use crate::strip::spine::Spine;
 use nalgebra::Vector2;
 
 /// A flat point with the rib or the plane that it lies on.

@@ -1,9 +1,9 @@
 //! Triangle meshes of the whole belt.
 
-use super::board::{Board, End, Foot};
 use super::patch::{Polygon, edge_points};
 use super::rib::Rib;
-use crate::spine::Spine;
+use crate::board::feet::{Board, End, Foot};
+use crate::strip::spine::Spine;
 use nalgebra::{Vector2, Vector3};
 
 /// A triangle mesh of the deformed belt that knows the flat board it came from.

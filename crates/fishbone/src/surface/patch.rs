@@ -1,7 +1,7 @@
 //! Flat polygons of the board that no ribs divide: left-over corners and bent stiffeners.
 
-use super::board::Board;
-use crate::spine::Spine;
+use crate::board::feet::Board;
+use crate::strip::spine::Spine;
 use nalgebra::Vector2;
 
 /// A simple polygon; neighbouring edges may lie on one line.

@@ -1,10 +1,10 @@
 //! Ribs: the straight lines of the surface, Eq. (20)–(22) and (26)–(33).
 
-use super::board::{Board, End, Foot};
-use super::flat::FlatFrame;
 use super::locate::locate;
-use crate::lie::Pose;
-use crate::spine::Spine;
+use crate::board::feet::{Board, End, Foot};
+use crate::board::flat::FlatFrame;
+use crate::geometry::Pose;
+use crate::strip::spine::Spine;
 use nalgebra::{Vector2, Vector3};
 
 /// Rib angle α = atan β.
@@ -49,22 +49,6 @@ pub fn bend_vector(pose: &Pose, rib_slope: f64) -> Vector3<f64> {
 /// Source: Eq. (22), sign corrected
 pub fn edge_foot(u: f64, rib_slope: f64, v: f64) -> f64 {
     u - v * rib_slope
-}
-
-/// How fast neighbouring ribs converge towards +v: s = β' + κ_g (1 + β²).
-///
-/// The strip between two ribs is (1 − v s) du wide at v, so ribs meet at v = 1/s. For κ_g = 0 it is the β' of the source.
-///
-/// Source: Eq. (33), extended to curved belts
-pub fn rib_convergence(slope_rate: f64, geodesic: f64, rib_slope: f64) -> f64 {
-    slope_rate + geodesic * (1.0 + rib_slope * rib_slope)
-}
-
-/// The greatest |s| for which ribs do not cross inside the width, 2/V.
-///
-/// Source: Eq. (33)
-pub fn rib_convergence_bound(width: f64) -> f64 {
-    2.0 / width
 }
 
 /// The greatest |dα/du| for which the ribs of a straight belt do not cross inside the width.
@@ -212,7 +196,8 @@ pub fn rib_foot(spine: &Spine, y: f64, z: f64) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::surface::samples::{spine, waves};
+    use crate::board::samples::{spine, waves};
+    use crate::strip::ribs::{rib_convergence, rib_convergence_bound};
     use approx::assert_relative_eq;
     use proptest::prelude::*;
 
@@ -278,7 +263,7 @@ mod tests {
     #[test]
     fn test_rib_angle_has_the_slope_of_the_rates() {
         for (bend, slope) in [(2.0, 0.7), (-2.0, 0.7), (0.5, -3.0)] {
-            let torsion = crate::element::torsion(bend, slope);
+            let torsion = crate::strip::element::torsion(bend, slope);
             let angle = rib_angle_from_rates(bend, torsion).unwrap_or(f64::NAN);
             assert_relative_eq!(angle, rib_angle(slope), epsilon = 1e-15);
         }

@@ -15,7 +15,7 @@
 //!   or an end that rests against the belt, as exactly as a solver puts it there, stays clear.
 
 use super::mesh::mesh;
-use crate::spine::{Piece, Spine, SpinePoint};
+use crate::strip::spine::{Piece, Spine, SpinePoint};
 use nalgebra::Vector3;
 use std::ops::Range;
 

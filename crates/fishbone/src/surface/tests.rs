@@ -1,10 +1,12 @@
 //! Boards of every kind.
 
-use super::board::Board;
 use super::patch::Polygon;
-use super::samples::{Part, Plan, plans};
 use super::*;
-use crate::spine::{Piece, Spine};
+use crate::board::curve::Curve;
+use crate::board::feet::Board;
+use crate::board::outline::outline;
+use crate::board::samples::{Part, Plan, plans};
+use crate::strip::spine::{Piece, Spine};
 use approx::assert_relative_eq;
 use nalgebra::{Vector2, Vector3};
 use proptest::prelude::*;

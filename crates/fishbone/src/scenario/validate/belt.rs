@@ -8,7 +8,7 @@ use super::check::{
     Check, MAGNITUDES, at_most, between, finite, given, measurable, not_negative, positive,
     require, span,
 };
-use crate::material::{Material, PRESETS};
+use crate::board::material::{Material, PRESETS};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, TAU};
 use std::fmt::Arguments;
 use std::ops::RangeInclusive;

@@ -1,7 +1,7 @@
 //! The questions that every part of a scenario is asked, and how a refusal reads.
 
 use super::super::node::number;
-use crate::error::ScenarioError;
+use crate::scenario::error::ScenarioError;
 use std::fmt::{Arguments, Display};
 use std::ops::RangeInclusive;
 

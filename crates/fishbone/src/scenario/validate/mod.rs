@@ -6,7 +6,7 @@ mod outside;
 
 use super::node::number;
 use super::{Method, Scenario, SolverSpec, SupportSpec};
-use crate::error::ScenarioError;
+use crate::scenario::error::ScenarioError;
 use check::{Check, between, finite_vector, is_positive, require, span};
 use nalgebra::Vector3;
 use outside::{Extent, check_links, check_supports};

@@ -1,7 +1,7 @@
 use super::*;
-use crate::spine::Piece;
+use crate::board::samples::{spine, waves};
+use crate::strip::spine::Piece;
 use crate::surface::material_point;
-use crate::surface::samples::{spine, waves};
 use approx::assert_relative_eq;
 use proptest::prelude::*;
 use std::collections::{HashMap, HashSet};

@@ -1,6 +1,6 @@
 use super::*;
-use crate::lie::{Pose, Twist};
-use crate::surface::samples::{Part, Plan, Wave, plans, spine, waves};
+use crate::board::samples::{Part, Plan, Wave, plans, spine, waves};
+use crate::geometry::{Pose, Twist};
 use crate::surface::tests::is_admissible;
 use approx::assert_relative_eq;
 use proptest::prelude::*;
@@ -173,7 +173,7 @@ fn test_moebius_band_does_not_cross_itself() {
     let text = include_str!("../../../../../scenarios/mobius.toml");
     let scenario = crate::scenario::Scenario::from_toml(text).unwrap();
     let problem = crate::problem::Problem::new(scenario).unwrap();
-    let band = crate::equilibrium::solve(&problem, &mut || std::ops::ControlFlow::Continue(()));
+    let band = crate::solve::solve(&problem, &mut || std::ops::ControlFlow::Continue(()));
     assert_eq!(band.spine.half_turns.map(|n| n % 2), Some(1));
     assert_eq!(crosses_itself(&band.spine), None);
 }

@@ -1,0 +1,414 @@
+//! All equilibria of a problem that the search finds: many starts, then perturbations of each minimum and continuation in
+//! modal loads from each equilibrium.
+//!
+//! The starts are arches to either side with waves of bend and of rib slope laid over them, and lead to minima. A minimum
+//! perturbed along its lowest modes leads downhill to other minima. A load along one of the lowest modes of an equilibrium,
+//! continued until it is zero again, leads to another equilibrium, of one negative mode more or less. From a saddle the energy
+//! falls to both sides of its lowest mode.
+
+mod starts;
+
+use crate::analysis::symmetry::{SAME, are_twins};
+use crate::equilibrium::{
+    Equilibrium, Status, is_settled, minimum_from, minimum_next_to, of_solution,
+};
+use crate::problem::Problem;
+use crate::problem::program::{BeltPoint, BeltProgram};
+use crate::scenario::Method;
+use nalgebra::Vector2;
+use stagewise::Stationary;
+use std::ops::ControlFlow;
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// A mode of the programme.
+type Mode = stagewise::Mode<8>;
+
+/// Most minima that are perturbed.
+const PERTURBED: usize = 96;
+/// Modes along which a minimum is perturbed.
+const PERTURBED_MODES: usize = 4;
+/// Most equilibria that are continued in modal loads.
+const CONTINUED: usize = 16;
+/// Equilibria continued at a time, so that lower ones that are found meanwhile come first.
+const AT_A_TIME: usize = 4;
+/// Most negative modes of an equilibrium that is reported.
+const HIGHEST_INDEX: usize = 2;
+/// Modes along which an equilibrium is loaded, by its number of negative modes.
+const LOADED_MODES: [usize; HIGHEST_INDEX + 1] = [6, 4, 0];
+
+/// Runs `task(i)` for every i below a number, in any order and on any thread.
+pub type Run<'a> = dyn Fn(usize, &(dyn Fn(usize) + Sync)) + 'a;
+
+/// What is asked and reported while the search goes on, from any thread.
+pub trait Watch: Sync {
+    /// Whether to go on.
+    fn proceed(&self) -> ControlFlow<()>;
+
+    /// Number of tasks done, and of tasks planned so far.
+    fn report(&self, done: usize, planned: usize);
+}
+
+/// Runs one task after the other on this thread.
+pub fn one_by_one(count: usize, task: &(dyn Fn(usize) + Sync)) {
+    (0..count).for_each(task);
+}
+
+/// The equilibria of a problem, rising in energy: minima, and saddles with one or two
+/// negative modes.
+///
+/// Of shapes that are mirror images of each other the one is reported that bulges as the scenario asks. The same input gives
+/// the same output, whatever runs the tasks. Where nothing is found, the outcome of a solve is reported, whose message gives
+/// the reason.
+pub fn branches(problem: &Problem, run: &Run, watch: &dyn Watch) -> Vec<Equilibrium> {
+    let proceed = &mut || watch.proceed();
+    let first = crate::solve::solve(problem, proceed);
+    let is_intrinsic = problem.scenario().solver.method == Method::Intrinsic;
+    if first.status == Status::Infeasible || !is_intrinsic {
+        return vec![first];
+    }
+    let mut census = Census {
+        problem,
+        run,
+        watch,
+        found: Vec::new(),
+        done: AtomicUsize::new(0),
+        planned: 0,
+    };
+    census.enter(first.clone());
+    census.start();
+    census.perturb();
+    census.load();
+    census.confirm();
+    census.face();
+    let mut found = census.found;
+    if found.is_empty() {
+        return vec![first];
+    }
+    found.sort_by(|a, b| a.energy.total_cmp(&b.energy));
+    found
+}
+
+/// What has been found so far.
+struct Census<'a> {
+    problem: &'a Problem,
+    run: &'a Run<'a>,
+    watch: &'a dyn Watch,
+    found: Vec<Equilibrium>,
+    done: AtomicUsize,
+    planned: usize,
+}
+
+impl Census<'_> {
+    /// Runs a task for each item; what comes out, in the order of the items.
+    fn each<T: Sync, R: Send + Sync>(
+        &mut self,
+        items: &[T],
+        task: impl Fn(&T) -> R + Sync,
+    ) -> Vec<R> {
+        self.planned += items.len();
+        let slots: Vec<OnceLock<R>> = items.iter().map(|_| OnceLock::new()).collect();
+        (self.run)(items.len(), &|i| {
+            let filled = slots[i].set(task(&items[i]));
+            debug_assert!(filled.is_ok(), "every task runs once");
+            let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
+            self.watch.report(done, self.planned);
+        });
+        slots.into_iter().filter_map(OnceLock::into_inner).collect()
+    }
+
+    /// Enters an equilibrium unless it is known or has too many negative modes; of mirror images the higher.
+    fn enter(&mut self, equilibrium: Equilibrium) {
+        if equilibrium.status != Status::Converged || index(&equilibrium) > HIGHEST_INDEX {
+            return;
+        }
+        let same = self
+            .found
+            .iter_mut()
+            .find(|known| is_same(known, &equilibrium));
+        match same {
+            None => self.found.push(equilibrium),
+            Some(known) => {
+                if height(&equilibrium) > height(known) + 1e-9 * equilibrium.spine.length() {
+                    *known = equilibrium;
+                }
+            }
+        }
+    }
+
+    /// The equilibria lowest in energy among those that `may` be chosen and are like none `known`; they are known from then on.
+    fn lowest_unlike(
+        &self,
+        known: &mut Vec<Equilibrium>,
+        most: usize,
+        may: impl Fn(&Equilibrium) -> bool,
+    ) -> Vec<Equilibrium> {
+        let mut found: Vec<_> = self.found.iter().filter(|e| may(e)).collect();
+        found.sort_by(|a, b| a.energy.total_cmp(&b.energy));
+        let before = known.len();
+        for equilibrium in found {
+            let is_enough = known.len() == before + most;
+            if !is_enough && !known.iter().any(|known| is_like(known, equilibrium)) {
+                known.push(equilibrium.clone());
+            }
+        }
+        known[before..].to_vec()
+    }
+
+    /// Minimises from many starts.
+    fn start(&mut self) {
+        let problem = self.problem;
+        let starts = starts::starts(problem);
+        let watch = self.watch;
+        let found = self.each(&starts, |start| {
+            minimum_from(problem, start, &mut || watch.proceed())
+        });
+        for equilibrium in found {
+            self.enter(equilibrium);
+        }
+    }
+
+    /// Perturbs the minima along their lowest modes, the lowest in energy first, and the minima found so in turn; of minima
+    /// that are alike one.
+    fn perturb(&mut self) {
+        let mut perturbed = Vec::new();
+        loop {
+            let is_minimum = |e: &Equilibrium| e.stable() == Some(true);
+            let most = PERTURBED - perturbed.len();
+            let next = self.lowest_unlike(&mut perturbed, most, is_minimum);
+            if next.is_empty() {
+                return;
+            }
+            let (problem, watch) = (self.problem, self.watch);
+            let found = self.each(&next, |minimum| {
+                let modes = lowest_modes(minimum, PERTURBED_MODES);
+                let perturb = |mode: &Mode| perturbed_along(problem, minimum, mode, watch);
+                modes.iter().flat_map(perturb).collect::<Vec<_>>()
+            });
+            for equilibrium in found.into_iter().flatten() {
+                self.enter(equilibrium);
+            }
+        }
+    }
+
+    /// Continues the equilibria in loads along their lowest modes, the lowest in energy first, and those found so in turn.
+    fn load(&mut self) {
+        let mut continued = Vec::new();
+        loop {
+            let most = AT_A_TIME.min(CONTINUED - continued.len());
+            let next = self.lowest_unlike(&mut continued, most, |_| true);
+            if next.is_empty() {
+                return;
+            }
+            let modes = self.each(&next, |equilibrium| {
+                lowest_modes(
+                    equilibrium,
+                    LOADED_MODES[index(equilibrium).min(HIGHEST_INDEX)],
+                )
+            });
+            let tasks: Vec<_> = next
+                .iter()
+                .zip(&modes)
+                .flat_map(|(equilibrium, modes)| {
+                    let sided = modes.iter().flat_map(|mode| [(mode, true), (mode, false)]);
+                    sided.map(move |(mode, forth)| (equilibrium, mode, forth))
+                })
+                .collect();
+            let (problem, watch) = (self.problem, self.watch);
+            let found = self.each(&tasks, |(equilibrium, mode, forth)| {
+                beyond_modal_load(problem, equilibrium, mode, *forth, watch)
+            });
+            for equilibrium in found.into_iter().flatten() {
+                self.enter(equilibrium);
+            }
+        }
+    }
+
+    /// Keeps the equilibria that a mesh twice as fine has too; of equilibria that the mesh does not separate the lowest.
+    fn confirm(&mut self) {
+        let mut found = std::mem::take(&mut self.found);
+        found.sort_by(|a, b| a.energy.total_cmp(&b.energy));
+        let watch = self.watch;
+        let fine = self.each(&found, |found| {
+            on_finer_mesh(found, &mut || watch.proceed())
+        });
+        let mut known: Vec<(Equilibrium, f64)> = Vec::new();
+        for (found, fine) in found.into_iter().zip(fine) {
+            let Some(fine) = fine else {
+                continue;
+            };
+            let change = (fine.energy - found.energy).abs();
+            let is_known = |(known, own): &(Equilibrium, f64)| {
+                let is_level = (known.energy - fine.energy).abs() <= change.max(*own);
+                is_same(known, &fine) || (is_level && is_like(known, &fine))
+            };
+            if !known.iter().any(is_known) {
+                known.push((fine, change));
+                self.found.push(found);
+            }
+        }
+    }
+
+    /// Takes the mirror image of a minimum for it, where that meets the supports too and bulges more as asked.
+    fn face(&mut self) {
+        let found = std::mem::take(&mut self.found);
+        let watch = self.watch;
+        self.found = self.each(&found, |found| {
+            facing(found, &mut || watch.proceed()).unwrap_or_else(|| found.clone())
+        });
+    }
+}
+
+/// The mirror image that bulges most, where it does so more than the minimum itself.
+fn facing(
+    found: &Equilibrium,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Option<Equilibrium> {
+    /// Largest miss of the supports, lengths in U and angles in rad, that is rounding.
+    const ROUNDING: f64 = 1e-6;
+    const MIRRORS: [[f64; 2]; 3] = [[-1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]];
+    let solved = found.solved.as_ref()?;
+    let stable = found.stability.is_none_or(|s| s.negative_modes == 0);
+    let mirrored = MIRRORS
+        .into_iter()
+        .filter(|_| stable)
+        .filter_map(|[bend, slope]| {
+            let mut point = solved.at.point.clone();
+            for fields in &mut point.fields {
+                *fields = Vector2::new(bend * fields[0], slope * fields[1]);
+            }
+            solved.program.settle(&mut point);
+            let meets = solved.program.miss_of_supports(&point) < ROUNDING;
+            meets.then_some(point)
+        });
+    let images = mirrored.filter_map(|point| {
+        let image = minimum_next_to(&found.problem, &point, proceed);
+        (image.status == Status::Converged && is_same(found, &image)).then_some(image)
+    });
+    let highest = images.max_by(|a, b| height(a).total_cmp(&height(b)))?;
+    (height(&highest) > height(found) + 1e-9 * found.spine.length()).then_some(highest)
+}
+
+/// The same equilibrium on a mesh twice as fine; `None` where there is none like it.
+fn on_finer_mesh(
+    found: &Equilibrium,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Option<Equilibrium> {
+    let fine = found.refined(2 * found.problem.elements(), proceed)?;
+    let is_level = (fine.energy - found.energy).abs() <= LEVEL * size(found);
+    (is_level && found.displacement(&fine) <= NEAR).then_some(fine)
+}
+
+/// The lowest modes of an equilibrium.
+fn lowest_modes(equilibrium: &Equilibrium, count: usize) -> Vec<Mode> {
+    let solved = equilibrium.solved.as_ref().filter(|_| count > 0);
+    let modes = solved.and_then(|solved| {
+        stagewise::lowest_modes(&solved.program, &mut solved.at.clone(), count).ok()
+    });
+    modes.unwrap_or_default()
+}
+
+/// The minima that are found from where a minimum has been displaced far along a mode.
+fn perturbed_along(
+    problem: &Problem,
+    from: &Equilibrium,
+    mode: &Mode,
+    watch: &dyn Watch,
+) -> Vec<Equilibrium> {
+    const FAR: [f64; 4] = [0.1, -0.1, 0.3, -0.3];
+    let solved = from.solved.iter();
+    let starts = solved.flat_map(|solved| {
+        FAR.map(|far| stagewise::moved(&solved.program, &solved.at.point, mode, far))
+    });
+    starts
+        .map(|start| minimum_from(problem, &start, &mut || watch.proceed()))
+        .collect()
+}
+
+/// The equilibrium that a modal load leads to and, where that is a saddle, the minima downhill on either side.
+fn beyond_modal_load(
+    problem: &Problem,
+    from: &Equilibrium,
+    mode: &Mode,
+    forth: bool,
+    watch: &dyn Watch,
+) -> Vec<Equilibrium> {
+    let Some(solved) = &from.solved else {
+        return Vec::new();
+    };
+    let program = &solved.program;
+    let tolerance = problem.tolerance();
+    let proceed = &mut |_| watch.proceed();
+    let other = stagewise::over_modal_load(program, tolerance, &solved.at, mode, forth, proceed);
+    let Some(other) = other else {
+        return Vec::new();
+    };
+    let mut found = downhill(problem, program, &other, watch);
+    if is_settled(problem, program, &other.point) {
+        let solution = stagewise::assess(program, tolerance, &other);
+        found.push(of_solution(problem, program.clone(), solution));
+    }
+    found
+}
+
+/// The minima downhill from a saddle, to either side along its lowest mode.
+fn downhill(
+    problem: &Problem,
+    program: &BeltProgram,
+    saddle: &Stationary<BeltPoint>,
+    watch: &dyn Watch,
+) -> Vec<Equilibrium> {
+    const OFF: f64 = 0.01;
+    let modes = stagewise::lowest_modes(program, &mut saddle.clone(), 1).unwrap_or_default();
+    let falling = modes.into_iter().filter(|mode| mode.eigenvalue < 0.0);
+    let sides = falling.flat_map(|mode| {
+        [OFF, -OFF].map(|off| stagewise::moved(program, &saddle.point, &mode, off))
+    });
+    sides
+        .map(|side| minimum_from(problem, &side, &mut || watch.proceed()))
+        .collect()
+}
+
+/// Number of negative modes, 0 where that is open.
+fn index(equilibrium: &Equilibrium) -> usize {
+    equilibrium.stability.map_or(0, |s| s.negative_modes)
+}
+
+/// What differences of energy are measured by: that of bending, as the zero of a load's potential is anywhere; of a flat belt
+/// next to nothing.
+fn size(equilibrium: &Equilibrium) -> f64 {
+    const FLAT: f64 = 1e-6;
+    let unit = equilibrium.problem.units().energy;
+    equilibrium.elastic_energy.max(FLAT * unit)
+}
+
+/// Whether two equilibria are the same but for a symmetry.
+fn is_same(a: &Equilibrium, b: &Equilibrium) -> bool {
+    const SAME_LEVEL: f64 = 1e-4;
+    is_within(a, b, SAME_LEVEL, SAME)
+}
+
+/// Whether two equilibria may be the same but for a symmetry and the mesh.
+fn is_like(a: &Equilibrium, b: &Equilibrium) -> bool {
+    is_within(a, b, LEVEL, NEAR)
+}
+
+/// Whether two equilibria differ by no more than a share of the energy and a distance in U, and in no number of negative modes.
+fn is_within(a: &Equilibrium, b: &Equilibrium, share: f64, distance: f64) -> bool {
+    let solved = || Some((a.solved.as_ref()?, b.solved.as_ref()?));
+    let is_level = (a.energy - b.energy).abs() <= share * size(a).max(size(b));
+    let index = |e: &Equilibrium| e.stability.map(|s| s.negative_modes);
+    is_level
+        && index(a) == index(b)
+        && solved().is_some_and(|(a, b)| are_twins(&a.at.point.poses, &b.at.point.poses, distance))
+}
+
+/// With energies that differ by more than this share, or farther off, in U, two are not the same on different meshes.
+const LEVEL: f64 = 0.02;
+const NEAR: f64 = 0.03;
+
+/// How far an equilibrium bulges as its scenario asks.
+fn height(equilibrium: &Equilibrium) -> f64 {
+    let bulge = equilibrium.problem.bulge();
+    equilibrium.highest_point().position.dot(&bulge.normalize())
+}

@@ -1,0 +1,97 @@
+//! Where the search for all equilibria starts.
+
+use crate::equilibrium::guess::{guess, waved};
+use crate::problem::Problem;
+use crate::problem::program::BeltPoint;
+use nalgebra::Vector2;
+use std::f64::consts::PI;
+
+/// Shapes from which to search: arches to both sides and the straight belt with waves of bend and of rib slope over them,
+/// then sums of waves that cover the space of such sums evenly.
+pub(super) fn starts(problem: &Problem) -> Vec<BeltPoint> {
+    let program = problem.program(problem.elements());
+    let bulge = problem.bulge();
+    let [up, down] = [bulge, -bulge].map(|bulge| guess(&program, &bulge));
+    let mut starts = Vec::new();
+    for (base, kept) in [(&up, 1.0), (&down, 1.0), (&up, 0.0)] {
+        for (bend_waves, bend) in BENDS {
+            for (slope_waves, slope) in SLOPES {
+                starts.push(waved(&program, base, kept, &|u| {
+                    Vector2::new(
+                        bend * (PI * bend_waves * u).cos(),
+                        slope * (PI * slope_waves * u).sin(),
+                    )
+                }));
+            }
+        }
+    }
+    starts.extend((0..SUMS).map(|i| {
+        let sum = Sum::new(i);
+        waved(&program, &up, 0.0, &|u| sum.at(u))
+    }));
+    starts
+}
+
+/// Waves of bend: half waves along the belt, and amplitude in 1/U.
+const BENDS: [(f64, f64); 9] = [
+    (0.0, 0.0),
+    (0.0, 4.0),
+    (0.0, -4.0),
+    (1.0, 4.0),
+    (1.0, -4.0),
+    (2.0, 8.0),
+    (2.0, -8.0),
+    (3.0, 12.0),
+    (3.0, -12.0),
+];
+/// Waves of rib slope: half waves along the belt, and amplitude.
+const SLOPES: [(f64, f64); 5] = [(1.0, 0.0), (1.0, 0.5), (1.0, -0.5), (2.0, 0.5), (2.0, -0.5)];
+/// Number of sums of waves.
+const SUMS: usize = 4000;
+/// Number of waves in each.
+const WAVES: usize = 5;
+
+/// Sums of waves of bend and rib slope.
+struct Sum {
+    /// Amplitude and phase of every wave of bend, then of slope.
+    waves: [[(f64, f64); WAVES]; 2],
+}
+
+impl Sum {
+    /// The i-th of a sequence that covers all evenly: bends up to one and a half times that of a ring and slopes up to 0.5, root mean square.
+    ///
+    /// Source: M. Roberts, "The unreasonable effectiveness of quasirandom sequences" (2018).
+    fn new(i: usize) -> Self {
+        const NUMBERS: usize = 2 + 4 * WAVES;
+        // The root of x^(d+1) = x + 1, d the number of dimensions.
+        let mut root: f64 = 1.0;
+        for _ in 0..50 {
+            root = (1.0 + root).powf(1.0 / (NUMBERS as f64 + 1.0));
+        }
+        let mut ratio = 1.0;
+        let mut next = || {
+            ratio /= root;
+            (0.5 + (i as f64 + 1.0) * ratio).fract()
+        };
+        let sizes = [3.0 * PI * next(), 0.5 * next()];
+        let waves = sizes.map(|size| {
+            let mut waves = [(0.0, 0.0); WAVES];
+            for wave in &mut waves {
+                *wave = (2.0 * next() - 1.0, 2.0 * PI * next());
+            }
+            let norm = waves.iter().map(|wave| wave.0 * wave.0).sum::<f64>().sqrt();
+            waves.map(|(amplitude, phase)| (size * 2f64.sqrt() * amplitude / norm, phase))
+        });
+        Self { waves }
+    }
+
+    fn at(&self, u: f64) -> Vector2<f64> {
+        let [bend, slope] = self.waves.map(|waves| {
+            let wave = |(k, (amplitude, phase)): (usize, &(f64, f64))| {
+                amplitude * (PI * k as f64 * u + phase).cos()
+            };
+            waves.iter().enumerate().map(wave).sum()
+        });
+        Vector2::new(bend, slope)
+    }
+}

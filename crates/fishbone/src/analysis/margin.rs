@@ -1,0 +1,362 @@
+//! How far a support may move before the belt loses its stability.
+
+use crate::analysis::continuation::{NoBranch, is_near_limit, meshed};
+use crate::analysis::path::{Motion, NoPath, Path};
+use crate::equilibrium::{Equilibrium, Uncertified, is_settled};
+use crate::geometry::{Pose, exp, log};
+use crate::problem::Mesh;
+use crate::problem::program::{BeltPoint, BeltProgram, rows_of};
+use nalgebra::{Vector3, Vector6};
+use stagewise::{Continuation, End, Events, Family, Pace, Turn};
+use std::ops::ControlFlow;
+use thiserror::Error;
+
+/// A station of a branch.
+type Station = stagewise::Station<BeltPoint, 8>;
+
+/// A way to the loss of stability.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Margin {
+    /// How far it is: the norm of displacement in U and rotation in rad.
+    pub distance: f64,
+    /// Where to: displacement and rotation left in world axes, of norm 1.
+    pub direction: Vector6<f64>,
+    /// Whether stability ends in a fold, where the belt snaps; else other equilibria branch off.
+    pub is_fold: bool,
+    /// Position of the support there.
+    pub position: Vector3<f64>,
+    /// Rotation vector of the support there.
+    pub rotation: Vector3<f64>,
+}
+
+/// Why there is no margin.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum NoMargin {
+    /// There is no equilibrium.
+    #[error(transparent)]
+    Uncertified(#[from] Uncertified),
+    /// The equilibrium cannot be followed.
+    #[error(transparent)]
+    NoBranch(#[from] NoBranch),
+    /// It is none that is stable.
+    #[error("the equilibrium is not stable: it has no stability to lose")]
+    NotStable,
+    /// The support does not hold all of a pose.
+    #[error(
+        "supports[{0}] does not hold a position and a rotation, all of both: nothing can be moved there"
+    )]
+    NotClamped(usize),
+    /// The support may not be moved so far, or not at all.
+    #[error(transparent)]
+    NoPath(#[from] NoPath),
+    /// The equilibrium could be followed only so far, stable on the way.
+    #[error(
+        "the equilibrium could be followed only {0:.3} of the way to `reach`, stable until there: a shorter reach may do"
+    )]
+    Lost(f64),
+}
+
+/// The boundary of stability, as it is met along a direction.
+struct Boundary {
+    margin: Margin,
+    /// The change of the support's reaction along the mode that vanishes, of norm 1: square to the boundary where that is a
+    /// fold; where others branch off, the way on which they come apart.
+    across: Option<Vector6<f64>>,
+}
+
+impl Equilibrium {
+    /// How far a support may move along a direction before stability is lost; `None` where that is not so within `reach`, and
+    /// where the belt comes to its inextensible limit before.
+    ///
+    /// Directions are displacement in U and rotation left in world axes about the support point; their length does not matter.
+    /// `proceed` is asked once a step whether to go on.
+    ///
+    /// # Errors
+    ///
+    /// [`NoMargin`] unless the equilibrium is stable and the support holds all of a pose, and where it cannot be followed.
+    pub fn margin_along(
+        &self,
+        support: usize,
+        direction: &Vector6<f64>,
+        reach: f64,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Result<Option<Margin>, NoMargin> {
+        let found = self.boundary(support, &direction.normalize(), reach, proceed)?;
+        Ok(found.map(|boundary| boundary.margin))
+    }
+
+    /// The same to wherever it is nearest, as far as can be told: from places along the six axes, and along the ways on which
+    /// the lowest eigenvalues of the second variation fall fastest, on along the normal of the boundary there, until that
+    /// is the way that was taken.
+    ///
+    /// # Errors
+    ///
+    /// [`NoMargin`] unless the equilibrium is stable and the support holds all of a pose, and where it cannot be followed.
+    pub fn margin(
+        &self,
+        support: usize,
+        reach: f64,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Result<Option<Margin>, NoMargin> {
+        /// From so many of the nearest places the search goes on.
+        const REFINED: usize = 4;
+        /// As many times as far as the nearest place that is known it looks for others to go on from.
+        const FARTHER: f64 = 2.0;
+        /// So much to the side of a way that ends where others branch off.
+        const ASIDE: [f64; 2] = [0.3, -0.3];
+        let axes = (0..6).flat_map(|axis| [1.0, -1.0].map(|sign| sign * Vector6::ith(axis, 1.0)));
+        let steepest = self.falls(support, proceed)?;
+        let mut found = Vec::new();
+        let mut lost = None;
+        let mut look = |direction: &Vector6<f64>, found: &mut Vec<Boundary>| {
+            let nearest = found.first().map_or(reach, |b| FARTHER * b.margin.distance);
+            match self.boundary(support, direction, nearest.min(reach), proceed) {
+                Ok(boundary) => found.extend(boundary),
+                Err(NoMargin::Lost(share)) => lost = Some(share),
+                Err(other) => return Err(other),
+            }
+            found.sort_by(|a, b| a.margin.distance.total_cmp(&b.margin.distance));
+            Ok(())
+        };
+        for direction in steepest.into_iter().chain(axes) {
+            look(&direction, &mut found)?;
+        }
+        // Where others branch off, the boundary has an edge: folds lie nearer to either side of it.
+        let edges = found.iter().filter(|b| !b.margin.is_fold).take(REFINED);
+        let beside = |edge: &Boundary| {
+            let across = edge.across?;
+            Some(ASIDE.map(|aside| (edge.margin.direction + aside * across).normalize()))
+        };
+        let sides: Vec<_> = edges.filter_map(beside).flatten().collect();
+        for direction in sides {
+            look(&direction, &mut found)?;
+        }
+        if let (true, Some(share)) = (found.is_empty(), lost) {
+            return Err(NoMargin::Lost(share));
+        }
+        found.truncate(REFINED);
+        let mut margins = Vec::new();
+        for boundary in found {
+            margins.push(self.nearest_from(support, boundary, proceed)?);
+        }
+        Ok(margins
+            .into_iter()
+            .min_by(|a, b| a.distance.total_cmp(&b.distance)))
+    }
+
+    /// From a place on the boundary of stability on along its normal, until that is the way that was taken.
+    fn nearest_from(
+        &self,
+        support: usize,
+        mut best: Boundary,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Result<Margin, NoMargin> {
+        const ROUNDS: usize = 16;
+        const SAME: f64 = 1e-6;
+        for _ in 0..ROUNDS {
+            let Some(normal) = best.across.filter(|_| best.margin.is_fold) else {
+                break;
+            };
+            let towards = normal * normal.dot(&best.margin.direction).signum();
+            if 1.0 - towards.dot(&best.margin.direction) < SAME {
+                break;
+            }
+            // All the way, or half of it where that leads to no nearer place.
+            let mut nearer = None;
+            for way in [towards, (towards + best.margin.direction).normalize()] {
+                nearer = match self.boundary(support, &way, best.margin.distance, proceed) {
+                    Ok(found) => found,
+                    Err(NoMargin::Lost(_)) => None,
+                    Err(other) => return Err(other),
+                };
+                if nearer.is_some() {
+                    break;
+                }
+            }
+            match nearer {
+                Some(nearer) => best = nearer,
+                None => break,
+            }
+        }
+        Ok(best.margin)
+    }
+
+    /// Directions in which the lowest eigenvalues of the second variation fall fastest, by central differences.
+    fn falls(
+        &self,
+        support: usize,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Result<Vec<Vector6<f64>>, NoMargin> {
+        const STEP: f64 = 1e-3;
+        const LOWEST: usize = 2;
+        let mut gradients = [Vector6::zeros(); LOWEST];
+        for axis in 0..6 {
+            let mut values = [[0.0; LOWEST]; 2];
+            for (sign, values) in [1.0, -1.0].into_iter().zip(&mut values) {
+                let way = Way::new(self, support, &(sign * Vector6::ith(axis, 1.0)), STEP)?;
+                let solved = self.certified()?;
+                let continuation = way.continuation();
+                let modes = continuation
+                    .start(&solved.at, way.path.length(), true)
+                    .and_then(|station| continuation.modes(&station, LOWEST));
+                let Some(modes) = modes.filter(|modes| modes.len() == LOWEST) else {
+                    return Ok(Vec::new());
+                };
+                *values = [0, 1].map(|i| modes[i].eigenvalue);
+                if proceed().is_break() {
+                    return Ok(Vec::new());
+                }
+            }
+            for (i, gradient) in gradients.iter_mut().enumerate() {
+                gradient[axis] = values[0][i] - values[1][i];
+            }
+        }
+        let falling = gradients
+            .into_iter()
+            .filter(|gradient| gradient.norm() > 0.0);
+        Ok(falling.map(|gradient| -gradient.normalize()).collect())
+    }
+
+    /// Where stability is lost along a direction of norm 1.
+    fn boundary(
+        &self,
+        support: usize,
+        direction: &Vector6<f64>,
+        reach: f64,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Result<Option<Boundary>, NoMargin> {
+        let way = Way::new(self, support, direction, reach)?;
+        let solved = self.certified()?;
+        let continuation = way.continuation();
+        let start = continuation.start(&solved.at, 0.0, true);
+        let start = start.ok_or(NoBranch::Singular)?;
+        let curve = continuation.trace(start, &mut |_| proceed());
+        let length = way.path.length();
+        let is_open = |station: &Station| station.negative == 0 && way.holds(station);
+        let stable = curve
+            .stations
+            .iter()
+            .take_while(|station| is_open(station))
+            .count();
+        let last = curve.stations[..stable]
+            .last()
+            .map_or(0.0, |station| station.parameter);
+        let event = curve.events.first().filter(|(state, _)| *state <= stable);
+        let is_near_limit = is_near_limit(&way.path, last);
+        let Some((_, event)) =
+            event.filter(|(_, event)| event.turn != Turn::Apex || !is_near_limit)
+        else {
+            let goes_on = stable == curve.stations.len();
+            return match curve.end {
+                End::Range | End::Stopped(()) if goes_on => Ok(None),
+                _ if is_near_limit => Ok(None),
+                _ => Err(NoMargin::Lost(last / length)),
+            };
+        };
+        let distance = event.parameter / length * reach;
+        let pose = way.pose_at(distance);
+        let rows = continuation.multipliers_along(event);
+        let across = rows.map(|rows| {
+            let held = &solved.program.supports[support];
+            let at = &event.station.at.point.poses[held.node];
+            let (force, moment) = held.reaction(at, &rows_of(&rows, support));
+            Vector6::from_iterator(force.iter().chain(&moment).copied()).normalize()
+        });
+        Ok(Some(Boundary {
+            margin: Margin {
+                distance,
+                direction: *direction,
+                is_fold: event.turn == Turn::Fold,
+                position: pose.position,
+                rotation: log(&pose.frame),
+            },
+            across,
+        }))
+    }
+}
+
+/// A support's way along a direction of norm 1.
+struct Way {
+    path: Path,
+    mesh: Mesh,
+    from: Pose,
+    direction: Vector6<f64>,
+    /// U.
+    length: f64,
+}
+
+impl Way {
+    /// So far, in legs that turn by less than half a turn.
+    fn new(
+        equilibrium: &Equilibrium,
+        support: usize,
+        direction: &Vector6<f64>,
+        reach: f64,
+    ) -> Result<Self, NoMargin> {
+        const LEG: f64 = 3.0;
+        let solved = equilibrium.certified()?;
+        if equilibrium.stable() != Some(true) {
+            return Err(NoMargin::NotStable);
+        }
+        let problem = &equilibrium.problem;
+        let from = problem.clamp(support);
+        let from = from.ok_or(NoMargin::NotClamped(support))?;
+        let length = problem.units().length;
+        let legs = (reach * direction.fixed_rows::<3>(3).norm() / LEG)
+            .ceil()
+            .max(1.0);
+        let ends = (1..=legs as usize).map(|leg| {
+            let end = displaced(&from, direction, length, reach * leg as f64 / legs);
+            (end.position, log(&end.frame))
+        });
+        let poses: Vec<_> = ends.collect();
+        let path = Path::poses(problem, support, &poses, Motion::Straight);
+        Ok(Self {
+            path: path?,
+            mesh: Mesh::of(problem, &solved.program),
+            from,
+            direction: *direction,
+            length,
+        })
+    }
+
+    /// The support's pose so far along.
+    fn pose_at(&self, far: f64) -> Pose {
+        displaced(&self.from, &self.direction, self.length, far)
+    }
+
+    fn continuation(&self) -> Continuation<'_, Self, 6, 2, 8> {
+        const PACE: Pace = Pace {
+            longest: 0.05,
+            stations: 1000,
+            events: Events::EndAtFirst,
+        };
+        let tolerance = self.path.base().tolerance();
+        Continuation::new(self, tolerance, [0.0, self.path.length()], PACE)
+    }
+
+    /// Whether the ribs are held by the edges that they reach, and by no other.
+    fn holds(&self, station: &Station) -> bool {
+        let meshed = meshed(&self.path, &self.mesh, station.parameter);
+        meshed.is_some_and(|(problem, program)| is_settled(&problem, &program, &station.at.point))
+    }
+}
+
+/// A pose so far along a direction, lengths in a unit.
+fn displaced(from: &Pose, direction: &Vector6<f64>, unit: f64, far: f64) -> Pose {
+    let [shift, turn] = [0, 3].map(|i| far * direction.fixed_rows::<3>(i).into_owned());
+    Pose {
+        position: from.position + unit * shift,
+        frame: exp(&turn) * from.frame,
+    }
+}
+
+impl Family<6, 2, 8> for Way {
+    type Point = BeltPoint;
+    type Program = BeltProgram;
+
+    fn at(&self, place: f64) -> Option<BeltProgram> {
+        self.path.at(place)?.program_on(&self.mesh)
+    }
+}

@@ -1,0 +1,10 @@
+//! What is found out about equilibria: modes, derivatives, tracking, paths, margins, all equilibria of a problem.
+
+pub mod branches;
+pub mod continuation;
+pub mod margin;
+pub mod modes;
+pub mod path;
+pub mod sensitivity;
+mod symmetry;
+pub mod tracking;

@@ -1,0 +1,73 @@
+//! Modes: eigenvectors of the second variation of the energy at an equilibrium.
+
+use crate::analysis::sensitivity::Motion;
+use crate::equilibrium::{Equilibrium, Uncertified};
+use crate::problem::program::NodeVector;
+use stagewise::Singular;
+use thiserror::Error;
+
+/// A motion of the belt from an equilibrium, one of the lowest of a set that the second variation does not couple; in the
+/// units of the scenario.
+///
+/// Its scale is such that the mean over the board of the squared displacement is 1: that of a strip across the spine that
+/// turns with the frame, V²/12 about the spine, all of the board weighing alike.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mode {
+    /// Second variation of the energy: twice what it rises by, per squared displacement.
+    pub eigenvalue: f64,
+    /// Motion of every node.
+    pub motion: Vec<Motion>,
+    /// Change of the bend ω_ζ at every node.
+    pub bend: Vec<f64>,
+    /// Change of the rib slope β at every node.
+    pub rib_slope: Vec<f64>,
+}
+
+/// Why an equilibrium has no modes.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum NoModes {
+    /// There is no equilibrium.
+    #[error(transparent)]
+    Uncertified(#[from] Uncertified),
+    /// The factorisation broke down.
+    #[error("the second variation could not be factorised")]
+    Singular,
+}
+
+impl Equilibrium {
+    /// The lowest modes, rising; fewer than `count` where the mesh has no more.
+    ///
+    /// # Errors
+    ///
+    /// [`NoModes`] unless the solve has converged.
+    pub fn modes(&self, count: usize) -> Result<Vec<Mode>, NoModes> {
+        let solved = self.certified()?;
+        let modes = stagewise::lowest_modes(&solved.program, &mut solved.at.clone(), count);
+        let units = self.problem.units();
+        let length = units.length;
+        let of_node = |node: usize, motion: &NodeVector| {
+            let rotation = motion.fixed_rows::<3>(3).into_owned();
+            let position = solved.at.point.poses[node].position;
+            Motion {
+                translation: motion.fixed_rows::<3>(0) + rotation.cross(&position),
+                rotation: rotation / length,
+            }
+        };
+        let mode = |mode: stagewise::Mode<8>| {
+            let nodes = mode.motion.iter();
+            Mode {
+                eigenvalue: mode.eigenvalue * units.energy / length.powi(2),
+                motion: nodes
+                    .clone()
+                    .enumerate()
+                    .map(|(k, node)| of_node(k, node))
+                    .collect(),
+                bend: nodes.clone().map(|node| node[6] / length.powi(2)).collect(),
+                rib_slope: nodes.map(|node| node[7] / length).collect(),
+            }
+        };
+        let modes = modes.map_err(|Singular| NoModes::Singular)?;
+        Ok(modes.into_iter().map(mode).collect())
+    }
+}

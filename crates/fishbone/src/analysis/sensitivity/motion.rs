@@ -1,0 +1,54 @@
+//! Motions of a node: what the step of its state does to it in the world. The one place that knows which coordinates the
+//! programme's states have.
+
+use super::Motion;
+use crate::geometry::Pose;
+use crate::problem::program::NodeVector;
+use nalgebra::Vector3;
+
+/// The motion of a node along the step of its state, a twist about the programme's origin.
+pub(super) fn motion(pose: &Pose, step: &NodeVector) -> Motion {
+    let rotation: Vector3<f64> = step.fixed_rows::<3>(3).into_owned();
+    Motion {
+        translation: step.fixed_rows::<3>(0) + rotation.cross(&pose.position),
+        rotation,
+    }
+}
+
+/// Adds the derivative by the state of a node whose derivatives by its motion are a force and a moment: the transpose of
+/// [`motion`].
+pub(super) fn add_pull(
+    pose: &Pose,
+    force: &Vector3<f64>,
+    moment: &Vector3<f64>,
+    into: &mut NodeVector,
+) {
+    let mut by_displacement = into.fixed_rows_mut::<3>(0);
+    by_displacement += force;
+    let mut by_rotation = into.fixed_rows_mut::<3>(3);
+    by_rotation += moment + pose.position.cross(force);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::exp;
+
+    #[test]
+    fn test_pull_does_the_work_of_force_and_moment_along_the_motion() {
+        let pose = Pose {
+            frame: exp(&Vector3::new(0.4, -0.9, 0.3)),
+            position: Vector3::new(0.1, 0.5, -0.2),
+        };
+        let step = NodeVector::from_fn(|i, _| 0.3 * i as f64 - 0.8);
+        let (force, moment) = (Vector3::new(1.0, -2.0, 0.5), Vector3::new(0.3, 0.7, -1.1));
+        let mut pull = NodeVector::zeros();
+        add_pull(&pose, &force, &moment, &mut pull);
+        let Motion {
+            translation,
+            rotation,
+        } = motion(&pose, &step);
+        let work = force.dot(&translation) + moment.dot(&rotation);
+        assert!((pull.dot(&step) - work).abs() < 1e-14);
+    }
+}

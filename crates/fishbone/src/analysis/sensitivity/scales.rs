@@ -1,0 +1,111 @@
+//! Between the parameters of a scenario and what its programme is made of.
+
+use super::data::{Data, HALF_WIDTH, NATURAL_BEND};
+use super::system::{Direction, System};
+use super::{Motion, Parameters};
+use crate::geometry::gauss_points;
+use crate::problem::program::BeltProgram;
+use crate::problem::{Problem, Units};
+use nalgebra::Vector3;
+
+/// A linear map from parameters to what a programme is made of.
+#[derive(Debug)]
+pub(super) struct Scales {
+    /// Units of the programme.
+    pub(super) units: Units,
+    /// Derivative by gravity of the potential at the programme's origin.
+    pub(super) origin_by_gravity: Vector3<f64>,
+    /// Weight per unit of gravity.
+    weight: f64,
+    supports: usize,
+    segments: usize,
+    /// Of every piece the segment that it is a part of.
+    segment: Vec<usize>,
+}
+
+impl Scales {
+    pub(super) fn new(problem: &Problem, program: &BeltProgram) -> Self {
+        let (belt, units) = (problem.belt(), problem.units());
+        let ends = belt.segments.iter().scan(0.0, |end, segment| {
+            *end += segment.length() / units.length;
+            Some(*end)
+        });
+        let ends: Vec<f64> = ends.collect();
+        let nodes = program.nodes();
+        let middles = nodes.windows(2).map(|ends| 0.5 * (ends[0] + ends[1]));
+        Self {
+            origin_by_gravity: -belt.density * units.length * problem.origin(),
+            weight: belt.density * units.length / units.force(),
+            supports: problem.scenario().supports.len(),
+            segments: ends.len(),
+            segment: middles
+                .map(|u| ends.partition_point(|end| *end < u).min(ends.len() - 1))
+                .collect(),
+            units,
+        }
+    }
+
+    pub(super) fn supports(&self) -> usize {
+        self.supports
+    }
+
+    pub(super) fn segments(&self) -> usize {
+        self.segments
+    }
+
+    /// The unit of rigidity.
+    fn rigidity(&self) -> f64 {
+        self.units.energy * self.units.length
+    }
+
+    /// What a change of the parameters changes of the programme.
+    pub(super) fn to_program(&self, parameters: &Parameters, system: &System) -> Direction {
+        let length = self.units.length;
+        let mut direction = system.unchanged();
+        for (to, motion) in direction.supports.iter_mut().zip(&parameters.supports) {
+            *to = Motion {
+                translation: motion.translation / length,
+                rotation: motion.rotation,
+            };
+        }
+        let nodes = parameters.rigidity.windows(2).zip(&self.segment);
+        for (data, (rigidity, segment)) in direction.elements.iter_mut().zip(nodes) {
+            for (i, t) in gauss_points().into_iter().enumerate() {
+                data[i] = ((1.0 - t) * rigidity[0] + t * rigidity[1]) / self.rigidity();
+            }
+            data[NATURAL_BEND] = parameters.natural_bend[*segment] * length;
+            data[HALF_WIDTH] = 0.5 * parameters.width / length;
+        }
+        direction.weight = parameters.gravity * self.weight;
+        direction
+    }
+
+    /// The derivative by the parameters, from that by what the programme is made of: the transpose of
+    /// [`Self::to_program`].
+    pub(super) fn to_scenario(&self, by: &Direction, nodes: usize) -> Parameters {
+        let length = self.units.length;
+        let supports = by.supports.iter().take(self.supports);
+        let mut parameters = Parameters {
+            supports: supports
+                .map(|motion| Motion {
+                    translation: motion.translation / length,
+                    rotation: motion.rotation,
+                })
+                .collect(),
+            rigidity: vec![0.0; nodes],
+            natural_bend: vec![0.0; self.segments],
+            width: 0.0,
+            gravity: by.weight * self.weight,
+        };
+        for (k, (data, segment)) in by.elements.iter().zip(&self.segment).enumerate() {
+            let data: &Data = data;
+            for (i, t) in gauss_points().into_iter().enumerate() {
+                parameters.rigidity[k] += (1.0 - t) * data[i] / self.rigidity();
+                parameters.rigidity[k + 1] += t * data[i] / self.rigidity();
+            }
+            parameters.natural_bend[*segment] += data[NATURAL_BEND] * length;
+            parameters.width += 0.5 * data[HALF_WIDTH] / length;
+        }
+        parameters
+    }
+}

@@ -1,0 +1,240 @@
+//! The linearised first-order conditions of a belt, and what changes of its data put on their right-hand side.
+
+use super::Motion;
+use super::data::{ByData, Data, HALF_WIDTH};
+use super::motion::{add_pull, motion};
+use crate::equilibrium::Solved;
+use crate::problem::program::{
+    BeltPoint, BeltProgram, NodeSupport, NodeVector, Piece, ROWS, Rows, Turn, rows_of, weight,
+};
+use nalgebra::{Vector3, Vector4};
+use stagewise::{Direction as Step, Program};
+use std::ops::Range;
+
+/// A change of all that a programme is made of, in its units; or a derivative by that.
+#[derive(Debug, Clone)]
+pub(super) struct Direction {
+    /// Motions of the supports.
+    pub(super) supports: Vec<Motion>,
+    /// Changes of the elements' data, one entry a piece.
+    pub(super) elements: Vec<Data>,
+    /// Change of the weight per unit length.
+    pub(super) weight: Vector3<f64>,
+}
+
+/// Derivatives of the Lagrangian by what the programme is made of.
+#[derive(Debug)]
+pub(super) struct System {
+    program: BeltProgram,
+    point: BeltPoint,
+    multipliers: Vec<Rows>,
+    turns: Vec<Turn>,
+    elements: Vec<Option<ByData>>,
+    /// Rows of the inequalities of every piece.
+    rows: Vec<Range<usize>>,
+}
+
+impl System {
+    pub(super) fn new(solved: &Solved) -> Self {
+        let (program, point) = (&solved.program, &solved.at.point);
+        let multipliers = &solved.at.multipliers;
+        let supports = program.supports.iter().enumerate();
+        let multipliers_of = |place| rows_of(&multipliers.equalities, place);
+        let layout = program.layout();
+        let rows: Vec<_> = (0..layout.stages())
+            .map(|stage| layout.stage_rows(stage))
+            .collect();
+        Self {
+            turns: supports
+                .map(|(i, support)| support.turn(&point.poses[support.node], &multipliers_of(i)))
+                .collect(),
+            elements: by_data(program, point, &rows, &multipliers.inequalities),
+            rows,
+            multipliers: (0..program.supports.len()).map(multipliers_of).collect(),
+            program: program.clone(),
+            point: point.clone(),
+        }
+    }
+
+    fn supports(&self) -> impl Iterator<Item = (usize, &NodeSupport, &Turn)> {
+        let supports = self.program.supports.iter().zip(&self.turns);
+        supports
+            .enumerate()
+            .map(|(i, (support, turn))| (i, support, turn))
+    }
+
+    /// The elements that bend, each with its number.
+    fn elements(&self) -> impl Iterator<Item = (usize, &ByData)> {
+        let elements = self.elements.iter().enumerate();
+        elements.filter_map(|(k, element)| Some((k, element.as_ref()?)))
+    }
+
+    /// Nothing changed.
+    pub(super) fn unchanged(&self) -> Direction {
+        Direction {
+            supports: vec![Motion::default(); self.turns.len()],
+            elements: vec![Data::zeros(); self.elements.len()],
+            weight: Vector3::zeros(),
+        }
+    }
+
+    /// Adds what a change puts on the right-hand side.
+    ///
+    /// A support's conditions depend on the turn from its frame to the node's alone. Let these turn by q and e: the
+    /// turn changes by e − q − ½ q × e, so that the mixed second derivative of multipliers times conditions is that by
+    /// e, with the sign changed, and −½ m · (q × e) with their moment m.
+    pub(super) fn add_change(&self, change: &Direction, into: &mut Step<8>) {
+        for (i, support, turn) in self.supports() {
+            let Motion {
+                translation,
+                rotation,
+            } = &change.supports[i];
+            let position = support.held(translation);
+            let frame = turn.jacobian * rotation;
+            let missed = position.iter().chain(&frame);
+            let rows = &mut into.equalities[ROWS * i..ROWS * (i + 1)];
+            for (row, missed) in rows.iter_mut().zip(missed) {
+                *row -= missed;
+            }
+            let moment = -turn.hessian * rotation - 0.5 * turn.pull.cross(rotation);
+            self.add_pull(support.node, &Vector3::zeros(), &moment, &mut into.nodes);
+        }
+        for (k, element) in self.elements() {
+            let data = &change.elements[k];
+            add_fields(k, &(element.mixed * data), &mut into.nodes);
+            let rows = &mut into.inequalities[self.rows[k].clone()];
+            for (row, slack) in rows.iter_mut().zip(&element.slacks) {
+                *row += slack * data[HALF_WIDTH];
+            }
+        }
+        for (node, force, lever) in self.weights(change.weight) {
+            let force = -force;
+            self.add_pull(node, &force, &lever.cross(&force), &mut into.nodes);
+        }
+    }
+
+    /// The derivative by a change of a solution's product with what the change puts on the right-hand side: the
+    /// transpose of [`Self::add_change`].
+    pub(super) fn response(&self, solution: &Step<8>) -> Direction {
+        let mut response = self.unchanged();
+        for (i, support, turn) in self.supports() {
+            let rows = rows_of(&solution.equalities, i);
+            let rotation = self.motion(support.node, &solution.nodes).rotation;
+            response.supports[i] = Motion {
+                translation: -support.held(&rows.fixed_rows::<3>(0).into()),
+                rotation: -turn.jacobian.tr_mul(&rows.fixed_rows::<3>(3)) - turn.hessian * rotation
+                    + 0.5 * turn.pull.cross(&rotation),
+            };
+        }
+        for (k, element) in self.elements() {
+            let data = &mut response.elements[k];
+            *data = element.mixed.tr_mul(&fields(k, &solution.nodes));
+            let rows = &solution.inequalities[self.rows[k].clone()];
+            for (row, slack) in rows.iter().zip(&element.slacks) {
+                data[HALF_WIDTH] += slack * row;
+            }
+        }
+        for (node, share, lever) in self.weights(Vector3::repeat(1.0)) {
+            let Motion {
+                translation,
+                rotation,
+            } = self.motion(node, &solution.nodes);
+            let moved = translation + rotation.cross(&lever);
+            response.weight -= share.component_mul(&moved);
+        }
+        response
+    }
+
+    /// Derivative of the least energy by what the programme is made of: the reactions, for one.
+    pub(super) fn by_change(&self) -> Direction {
+        let mut by = self.unchanged();
+        for (i, support, turn) in self.supports() {
+            let force = self.multipliers[i].fixed_rows::<3>(0).into();
+            by.supports[i] = Motion {
+                translation: -support.held(&force),
+                rotation: -turn.pull,
+            };
+        }
+        for (k, element) in self.elements() {
+            by.elements[k] = element.first;
+        }
+        for (node, share, lever) in self.weights(Vector3::repeat(1.0)) {
+            let at = self.point.poses[node].position + lever;
+            by.weight -= share.component_mul(&at);
+        }
+        by
+    }
+
+    /// The moment by which a support's reaction changes as it turns while the belt stays as it is.
+    pub(super) fn own_moment(&self, support: usize, rotation: &Vector3<f64>) -> Vector3<f64> {
+        let turn = &self.turns[support];
+        turn.hessian * rotation + 0.5 * turn.pull.cross(rotation)
+    }
+
+    /// The transpose of [`Self::own_moment`].
+    pub(super) fn by_own_moment(&self, support: usize, moment: &Vector3<f64>) -> Vector3<f64> {
+        let turn = &self.turns[support];
+        turn.hessian * moment - 0.5 * turn.pull.cross(moment)
+    }
+
+    /// The weight of the belt at its nodes: which node, force, lever in world axes.
+    fn weights(
+        &self,
+        per_length: Vector3<f64>,
+    ) -> impl Iterator<Item = (usize, Vector3<f64>, Vector3<f64>)> {
+        let pieces = self.program.pieces.iter().map(Piece::length).enumerate();
+        pieces.flat_map(move |(k, length)| {
+            let [first, second] = weight(&per_length, length);
+            [(k, first), (k + 1, second)].map(|(node, load)| {
+                let lever = self.point.poses[node].frame * load.lever;
+                (node, load.force, lever)
+            })
+        })
+    }
+
+    /// How a node moves along a step.
+    pub(super) fn motion(&self, node: usize, step: &[NodeVector]) -> Motion {
+        motion(&self.point.poses[node], &step[node])
+    }
+
+    /// Adds what pulls at a node to a derivative by the unknowns.
+    pub(super) fn add_pull(
+        &self,
+        node: usize,
+        force: &Vector3<f64>,
+        moment: &Vector3<f64>,
+        into: &mut [NodeVector],
+    ) {
+        add_pull(&self.point.poses[node], force, moment, &mut into[node]);
+    }
+}
+
+fn by_data(
+    program: &BeltProgram,
+    point: &BeltPoint,
+    rows: &[Range<usize>],
+    multipliers: &[f64],
+) -> Vec<Option<ByData>> {
+    let mut by_data: Vec<_> = program.pieces.iter().map(|_| None).collect();
+    for (k, element) in program.elements() {
+        let [a, b] = [point.fields[k], point.fields[k + 1]];
+        let fields = Vector4::new(a[0], a[1], b[0], b[1]);
+        let multipliers = &multipliers[rows[k].clone()];
+        by_data[k] = Some(ByData::at(element, program.model, &fields, multipliers));
+    }
+    by_data
+}
+
+/// Steps of the four unknowns of an element.
+fn fields(element: usize, step: &[NodeVector]) -> Vector4<f64> {
+    let [a, b] = [&step[element], &step[element + 1]];
+    Vector4::new(a[6], a[7], b[6], b[7])
+}
+
+/// Adds a derivative by the four unknowns of an element.
+fn add_fields(element: usize, by_fields: &Vector4<f64>, into: &mut [NodeVector]) {
+    for i in 0..2 {
+        into[element][6 + i] += by_fields[i];
+        into[element + 1][6 + i] += by_fields[2 + i];
+    }
+}

@@ -1,0 +1,291 @@
+//! Follows an equilibrium at the rate of a robot while one of its supports moves.
+
+use crate::equilibrium::{Equilibrium, Status, Uncertified, is_settled, of_solution, solve_near};
+use crate::geometry::{Pose, Wrench, exp};
+use crate::problem::program::{BeltPoint, BeltProgram, Piece, rows_of};
+use crate::problem::{Problem, Units};
+use crate::scenario::error::ScenarioError;
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+use stagewise::{Distance, FollowSettings, Followed, Follower, Residuals};
+use std::ops::ControlFlow;
+use thiserror::Error;
+
+/// Distance in U between equilibria up to which a step downhill is no snap: it is that of a rib bound which passes from one
+/// element to the next.
+const SMALLEST_JUMP: f64 = 2e-3;
+
+/// Why an equilibrium cannot be followed.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum NoTracker {
+    /// There is no equilibrium.
+    #[error(transparent)]
+    Uncertified(#[from] Uncertified),
+    /// The support does not hold all of a pose.
+    #[error(
+        "supports[{0}] does not hold a position and a rotation, all of both: nothing can be moved there"
+    )]
+    NotClamped(usize),
+    /// There is no such support.
+    #[error("the scenario has no supports[{0}] that could move")]
+    NoSupport(usize),
+    /// The shape may change at no cost of energy.
+    #[error("the equilibrium is no strict minimum of the energy: there is no one branch to follow")]
+    Marginal,
+}
+
+/// What became of a belt as its support moved.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Update {
+    /// Whether the belt is in equilibrium under the new pose; unless converged, the tracker stays where it was.
+    pub status: Status,
+    /// Whether the equilibrium that was followed ceased to exist or to be stable on the way, or could not be followed, and
+    /// this is another one.
+    pub snapped: bool,
+    /// Total potential of the shape that the tracker has now.
+    pub energy: f64,
+    /// Iterations.
+    pub iterations: usize,
+    /// How far the shape is from a solution of its discrete equations.
+    pub residuals: Residuals,
+}
+
+/// An equilibrium and the support that moves.
+pub struct Tracker {
+    /// What was solved where the tracker began.
+    problem: Problem,
+    support: usize,
+    follower: Follower<BeltProgram, 6, 2, 8>,
+    /// Where the support is, in the units of the programme.
+    pose: Pose,
+    /// What the potential of the programme lacks.
+    potential_of_origin: f64,
+    /// Whether ribs of one stretch may reach the edges of another.
+    has_bends: bool,
+}
+
+impl Tracker {
+    /// Starts at an equilibrium; the support is named by its place in the scenario.
+    ///
+    /// # Errors
+    ///
+    /// [`NoTracker`] unless it has converged to a strict minimum and the support holds position and rotation.
+    pub fn new(equilibrium: &Equilibrium, support: usize) -> Result<Self, NoTracker> {
+        let solved = equilibrium.certified()?;
+        let problem = equilibrium.problem.clone();
+        if support >= problem.scenario().supports.len() {
+            return Err(NoTracker::NoSupport(support));
+        }
+        let Pose { frame, position } = problem
+            .clamp(support)
+            .ok_or(NoTracker::NotClamped(support))?;
+        let settings = FollowSettings {
+            tolerance: problem.tolerance(),
+            smallest_jump: SMALLEST_JUMP,
+        };
+        let follower = Follower::new(solved.program.clone(), settings, &solved.at);
+        let follower = follower.ok_or(NoTracker::Marginal)?;
+        let bends = |piece: &Piece| match piece {
+            Piece::Strip(element) => element.geodesic != 0.0,
+            Piece::Joint { angle } => *angle != 0.0,
+            Piece::Rigid { .. } => false,
+        };
+        let (units, origin) = (problem.units(), problem.origin());
+        let (program, point) = (&solved.program, &solved.at.point);
+        let stored = program.elastic_energy(&point.fields) + program.load_potential(&point.poses);
+        Ok(Self {
+            support,
+            pose: Pose {
+                frame,
+                position: (position - origin) / units.length,
+            },
+            has_bends: solved.program.pieces.iter().any(bends),
+            potential_of_origin: equilibrium.energy - stored * units.energy,
+            problem,
+            follower,
+        })
+    }
+
+    /// Moves the support to a position and a rotation vector, world axes, and the belt with it.
+    ///
+    /// Nothing is allocated where the equilibrium is followed and the board has neither links nor bends. `proceed` is asked
+    /// now and then whether to go on; `Break` leaves the tracker where it was. So does a pose that no scenario may hold, which
+    /// is infeasible: one that is not finite, or too many lengths of the belt away.
+    pub fn update(
+        &mut self,
+        position: &Vector3<f64>,
+        rotation: &Vector3<f64>,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Update {
+        let goal = Pose {
+            frame: exp(rotation),
+            position: (position - self.problem.origin()) / self.units().length,
+        };
+        let (from, support) = (self.pose, self.support);
+        let held = self.in_scenario(&goal);
+        let may_hold = self.problem.check_support_pose(support, &held).is_ok();
+        // A rotation vector that is not finite makes a frame that is.
+        if !may_hold || rotation.iter().any(|angle| !angle.is_finite()) {
+            return self.refused();
+        }
+        let turn = turn_between(&from.frame, &goal.frame);
+        let length = (goal.position - from.position).norm() + turn.norm();
+        let mut change = |program: &mut BeltProgram, share: f64| {
+            let between = Pose {
+                position: from.position.lerp(&goal.position, share),
+                frame: match share < 1.0 {
+                    true => from.frame * exp(&(share * turn)),
+                    false => goal.frame,
+                },
+            };
+            program.move_support(support, &between);
+        };
+        let followed = self.follower.follow(length, &mut change, proceed);
+        if followed.arrived && self.is_settled() {
+            self.pose = goal;
+            return Update {
+                status: Status::Converged,
+                snapped: followed.jumped,
+                energy: self.energy(),
+                iterations: followed.iterations,
+                residuals: followed.residuals,
+            };
+        }
+        let Ok(problem) = self.problem_at(&goal) else {
+            self.return_to_start();
+            return self.refused();
+        };
+        let found = solve_near(&problem, self.follower.point(), proceed);
+        self.take(&found, followed)
+    }
+
+    /// What becomes of the belt where its support may not be held: it stays where it was.
+    fn refused(&mut self) -> Update {
+        Update {
+            status: Status::Infeasible,
+            snapped: false,
+            energy: self.energy(),
+            iterations: 0,
+            residuals: self.follower.solution().residuals,
+        }
+    }
+
+    /// Takes over what was found where the last equilibrium could not be followed, or reaches edges that it did not before.
+    fn take(&mut self, found: &Equilibrium, followed: Followed) -> Update {
+        /// Ribs held by another edge move the belt less.
+        const SAME: f64 = 0.01;
+        let solved = found.solved.as_ref();
+        let is_same = |shape: &BeltPoint| shape.distance(self.follower.point()) < SAME;
+        let goes_on = followed.arrived && solved.is_some_and(|solved| is_same(&solved.at.point));
+        let mut update = Update {
+            status: found.status,
+            snapped: found.status == Status::Converged && (followed.jumped || !goes_on),
+            energy: found.energy,
+            iterations: followed.iterations + found.iterations,
+            residuals: found.residuals,
+        };
+        match Self::new(found, self.support) {
+            Ok(other) => *self = other,
+            Err(_) => {
+                self.return_to_start();
+                if update.status == Status::Converged {
+                    (update.status, update.snapped) = (Status::NotConverged, false);
+                }
+                update.energy = self.energy();
+            }
+        }
+        update
+    }
+
+    fn is_settled(&self) -> bool {
+        !self.has_bends
+            || is_settled(
+                &self.problem,
+                self.follower.program(),
+                self.follower.point(),
+            )
+    }
+
+    fn return_to_start(&mut self) {
+        let (support, pose) = (self.support, self.pose);
+        self.follower
+            .return_to_start(|program| program.move_support(support, &pose));
+    }
+
+    fn units(&self) -> Units {
+        self.problem.units()
+    }
+
+    /// A pose of the programme in the units of the scenario.
+    fn in_scenario(&self, pose: &Pose) -> Pose {
+        Pose {
+            frame: pose.frame,
+            position: self.problem.origin() + pose.position * self.units().length,
+        }
+    }
+
+    /// The problem with the support elsewhere. The programme keeps its origin, also where that is the support that moves.
+    fn problem_at(&self, pose: &Pose) -> Result<Problem, ScenarioError> {
+        let pose = self.in_scenario(pose);
+        let moved = self.problem.with_support_pose(self.support, &pose)?;
+        Ok(moved.about(self.problem.origin()))
+    }
+
+    /// All that is to be known of the present equilibrium.
+    pub fn equilibrium(&mut self) -> Equilibrium {
+        let problem = self.problem_at(&self.pose);
+        let problem = problem.expect("the pose was checked before the belt was led there");
+        let solution = self.follower.solution();
+        of_solution(&problem, self.follower.program().clone(), solution)
+    }
+
+    fn point(&self) -> &BeltPoint {
+        self.follower.point()
+    }
+
+    /// Total potential.
+    pub fn energy(&self) -> f64 {
+        self.follower.values().objective * self.units().energy + self.potential_of_origin
+    }
+
+    /// Positions of the nodes.
+    pub fn positions(&self) -> impl Iterator<Item = Vector3<f64>> {
+        let poses = self.point().poses.iter();
+        poses.map(|pose| self.problem.origin() + pose.position * self.units().length)
+    }
+
+    /// Frames of the nodes.
+    pub fn frames(&self) -> impl Iterator<Item = &Matrix3<f64>> {
+        self.point().poses.iter().map(|pose| &pose.frame)
+    }
+
+    /// Bend at the nodes.
+    pub fn bends(&self) -> impl Iterator<Item = f64> {
+        let fields = self.point().fields.iter();
+        fields.map(|fields| fields[0] / self.units().length)
+    }
+
+    /// Rib slope at the nodes.
+    pub fn rib_slopes(&self) -> impl Iterator<Item = f64> {
+        self.point().fields.iter().map(|fields| fields[1])
+    }
+
+    /// What a support does to the belt.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such support.
+    pub fn reaction(&self, support: usize) -> Wrench {
+        let program = self.follower.program();
+        let rows = rows_of(&self.follower.multipliers().equalities, support);
+        let held = &program.supports[support];
+        self.units()
+            .wrench(held.reaction(&self.point().poses[held.node], &rows))
+    }
+}
+
+/// The turn from one frame to another as a rotation vector in the axes of the first.
+fn turn_between(from: &Matrix3<f64>, to: &Matrix3<f64>) -> Vector3<f64> {
+    let turn = Rotation3::from_matrix_unchecked(from.tr_mul(to));
+    UnitQuaternion::from_rotation_matrix(&turn).scaled_axis()
+}

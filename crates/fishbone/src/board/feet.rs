@@ -1,0 +1,473 @@
+//! The flat board as ribs see it: where they end, and which of them passes a point.
+
+use crate::board::flat::{FlatFrame, FlatSpine, Round, direction};
+use crate::board::outline::{Chains, Edge};
+use crate::strip::spine::{Piece, Spine, SpinePoint};
+use nalgebra::Vector2;
+use std::f64::consts::FRAC_PI_2;
+
+/// The foot of a rib.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Foot {
+    pub(crate) point: SpinePoint,
+    /// Its place in the flat board.
+    pub(crate) flat: FlatFrame,
+    /// Segment of the chains that it lies on.
+    owner: usize,
+}
+
+impl Foot {
+    /// How far ahead of a flat point the rib passes, along the spine.
+    pub(crate) fn excess(&self, point: &Vector2<f64>) -> f64 {
+        excess(&self.flat, self.point.rib_slope, point)
+    }
+
+    /// Angle of the flat rib's normal from the y axis: the heading, turned by the rib angle α.
+    fn normal_angle(&self) -> f64 {
+        self.flat.heading + self.point.rib_slope.atan()
+    }
+}
+
+fn excess(frame: &FlatFrame, rib_slope: f64, point: &Vector2<f64>) -> f64 {
+    let local = frame.local(point);
+    -(local.x + local.y * rib_slope)
+}
+
+/// Where a rib leaves the board.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct End {
+    /// Coordinate v along the rib.
+    pub(crate) v: f64,
+    pub(crate) flat: Vector2<f64>,
+    /// Place on its chain: the index of a piece and the fraction of its length; whole at vertices.
+    pub(crate) place: f64,
+}
+
+/// The flat board: outline, nodes, and what is flat of itself.
+#[derive(Debug, Clone)]
+pub(crate) struct Board {
+    pub(crate) half_width: f64,
+    pub(crate) chains: Chains,
+    /// Stiffeners joined at corners, by their first and last node: no ribs, one plane.
+    pub(crate) plates: Vec<[usize; 2]>,
+    pub(crate) round: Option<Round>,
+    flat: FlatSpine,
+}
+
+impl Board {
+    pub(crate) fn of(spine: &Spine) -> Self {
+        let flat = FlatSpine::of(spine);
+        Self {
+            half_width: 0.5 * spine.width,
+            chains: Chains::of(spine, &flat),
+            plates: plates(spine),
+            round: Round::of(spine, &flat),
+            flat,
+        }
+    }
+
+    /// Flat lengths below this are one point: far above a solver's residuals, far below what is drawn or made.
+    pub(crate) fn tolerance(&self) -> f64 {
+        2e-6 * self.half_width
+    }
+
+    pub(crate) fn foot_at_node(&self, spine: &Spine, node: usize) -> Foot {
+        Foot {
+            point: spine.node(node),
+            flat: self.flat.nodes[node],
+            owner: self.chains.own[0] + self.flat.owner[node],
+        }
+    }
+
+    /// The foot inside an element, a distance after its first node.
+    pub(crate) fn foot_within(&self, spine: &Spine, element: usize, distance: f64) -> Foot {
+        if spine.element_length(element) == 0.0 {
+            return self.foot_at_node(spine, element);
+        }
+        Foot {
+            point: spine.within(element, distance),
+            flat: self.frame_within(spine, element, distance),
+            owner: self.chains.own[0] + self.flat.owner[element + 1],
+        }
+    }
+
+    /// The foot at an arc length, before the jump where a node is repeated.
+    pub(crate) fn foot_at(&self, spine: &Spine, u: f64) -> Foot {
+        let next = spine.u.partition_point(|&node| node < u);
+        if next == 0 || next == spine.u.len() || spine.u[next] == u {
+            return self.foot_at_node(spine, next.min(spine.u.len() - 1));
+        }
+        self.foot_within(spine, next - 1, u - spine.u[next - 1])
+    }
+
+    fn frame_within(&self, spine: &Spine, element: usize, distance: f64) -> FlatFrame {
+        self.flat.nodes[element].along(spine.pieces[element].geodesic(), distance)
+    }
+
+    /// Whether an element lies inside a plate.
+    pub(crate) fn is_in_plate(&self, element: usize) -> bool {
+        let holds = |&[from, to]: &[usize; 2]| (from..to).contains(&element);
+        self.plates.iter().any(holds)
+    }
+
+    /// The ends of a rib, on the −ζ and on the +ζ side.
+    ///
+    /// An end within the tolerance of a vertex is put on it: a rib that a solver left square to ten digits ends at
+    /// the corners of the board and not on its end line.
+    pub(crate) fn ends(&self, foot: &Foot) -> [End; 2] {
+        [0, 1].map(|side| {
+            let window = Window::new(&self.chains, side, foot);
+            let mut end = window.end(&foot.flat.position, self.tolerance());
+            let v = foot.flat.local(&end.flat).y;
+            end.v = if side == 0 { v.min(0.0) } else { v.max(0.0) };
+            end
+        })
+    }
+
+    /// How far inside the edge on one side a flat point lies, in the direction of a rib; `None` beyond the edge's end.
+    pub(crate) fn depth(&self, foot: &Foot, side: usize, point: &Vector2<f64>) -> Option<f64> {
+        let window = Window::new(&self.chains, side, foot);
+        let end = window.hit(point, self.tolerance())?;
+        let outwards = direction(foot.normal_angle() + FRAC_PI_2.copysign(side as f64 - 0.5));
+        Some(outwards.dot(&(end.flat - point)))
+    }
+
+    /// The edges of a side behind the one beside a foot, that one if it is there, and those ahead of it; without the
+    /// lines across the ends of the board.
+    pub(crate) fn edges_beside(&self, side: usize, foot: &Foot) -> [&[Edge]; 3] {
+        let chain = self.chains.edges[side].as_slice();
+        let ends = usize::from(self.chains.is_open);
+        let (own, is_there) = nearest_piece(&self.chains, side, foot);
+        let ahead = own + usize::from(is_there);
+        [
+            &chain[ends..own],
+            &chain[own..ahead],
+            &chain[ahead..chain.len() - ends],
+        ]
+    }
+
+    /// Chain vertices strictly between two places, by their place and position.
+    pub(crate) fn vertices_between(
+        &self,
+        side: usize,
+        from: f64,
+        to: f64,
+    ) -> impl Iterator<Item = Vector2<f64>> {
+        let chain = &self.chains.edges[side];
+        let first = from.floor() as usize + 1;
+        (first..chain.len())
+            .take_while(move |&index| (index as f64) < to)
+            .map(|index| chain[index].curve.first())
+    }
+
+    /// Distances into an element of the ribs through vertices of the outline, rising.
+    pub(crate) fn vertex_ribs(&self, spine: &Spine, element: usize) -> Vec<f64> {
+        let length = spine.element_length(element);
+        if length == 0.0 || self.is_in_plate(element) {
+            return Vec::new();
+        }
+        let [before, after] =
+            [element, element + 1].map(|node| self.ends(&self.foot_at_node(spine, node)));
+        let mut distances: Vec<f64> = (0..2)
+            .flat_map(|side| self.vertices_between(side, before[side].place, after[side].place))
+            .filter_map(|vertex| self.distance_to(spine, element, &vertex))
+            .collect();
+        distances.sort_by(f64::total_cmp);
+        distances
+    }
+
+    /// Distance into an element of the rib whose line passes a flat point, if one of the element's does.
+    pub(crate) fn distance_to(
+        &self,
+        spine: &Spine,
+        element: usize,
+        point: &Vector2<f64>,
+    ) -> Option<f64> {
+        let excess = |distance: f64| {
+            let (_, slope) = spine.fields(element, distance);
+            excess(&self.frame_within(spine, element, distance), slope, point)
+        };
+        let ahead = |node: usize| self.foot_at_node(spine, node).excess(point);
+        let (mut low, mut high) = (0.0, spine.element_length(element));
+        if !(ahead(element) <= 0.0 && ahead(element + 1) >= 0.0) {
+            return None;
+        }
+        for _ in 0..64 {
+            let middle = 0.5 * (low + high);
+            if excess(middle) < 0.0 {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        Some(0.5 * (low + high))
+    }
+
+    /// Whether a flat point lies on the part of a rib's line that is on the board.
+    pub(crate) fn is_on_rib(&self, foot: &Foot, point: &Vector2<f64>) -> bool {
+        let [minus, plus] = self.ends(foot);
+        let margin = self.tolerance();
+        (minus.v - margin..=plus.v + margin).contains(&foot.flat.local(point).y)
+    }
+
+    /// The side on which the end of an open belt has a corner that its last rib leaves out, with that rib's end.
+    pub(crate) fn leftover(&self, ends: &[End; 2], at_start: bool) -> Option<usize> {
+        let beyond_corner = |&side: &usize| {
+            let corner = if at_start {
+                1
+            } else {
+                self.chains.edges[side].len() - 1
+            };
+            match at_start {
+                true => ends[side].place > corner as f64,
+                false => ends[side].place < corner as f64,
+            }
+        };
+        (0..2).filter(|_| self.chains.is_open).find(beyond_corner)
+    }
+}
+
+/// Runs of stiffeners with corners between them.
+fn plates(spine: &Spine) -> Vec<[usize; 2]> {
+    let mut runs: Vec<[usize; 2]> = Vec::new();
+    for element in (0..spine.elements()).filter(|&element| spine.pieces[element] == Piece::Rigid) {
+        let is_strip = |piece: &Piece| matches!(piece, Piece::Strip { .. });
+        match runs.last_mut() {
+            Some([_, to]) if !spine.pieces[*to..element].iter().any(is_strip) => *to = element + 1,
+            _ => runs.push([element, element + 1]),
+        }
+    }
+    let is_bent = |&[from, to]: &[usize; 2]| {
+        let run = &spine.pieces[from..to];
+        run.iter().any(|piece| piece.corner() != 0.0)
+    };
+    runs.retain(is_bent);
+    runs
+}
+
+/// The part of an edge that faces a rib: around its foot, as far as the edge heads forward across the rib.
+///
+/// Along it the coordinate normal to the rib rises, so that the rib meets it once; far turns of a board that
+/// overlaps itself are not in it.
+struct Window<'a> {
+    chain: &'a [Edge],
+    /// Angle of the rib's normal.
+    angle: f64,
+    /// Index of a piece, and the fractions of its length between which it counts.
+    pieces: Vec<(usize, [f64; 2])>,
+    /// The piece beside the foot.
+    start: usize,
+    is_open: bool,
+}
+
+impl<'a> Window<'a> {
+    fn new(chains: &'a Chains, side: usize, foot: &Foot) -> Self {
+        let chain = chains.edges[side].as_slice();
+        let (start, is_own) = nearest_piece(chains, side, foot);
+        let mut window = Self {
+            chain,
+            angle: foot.normal_angle(),
+            pieces: Vec::new(),
+            start,
+            is_open: chains.is_open,
+        };
+        let next = start + usize::from(is_own);
+        window.extend_back(next);
+        window.pieces.reverse();
+        let ends_inside = |&(index, [_, to]): &(usize, [f64; 2])| index == start && to < 1.0;
+        if !window.pieces.last().is_some_and(ends_inside) {
+            window.extend_forward(next);
+        }
+        window
+    }
+
+    fn extend_back(&mut self, end: usize) {
+        for index in (0..end).rev() {
+            let [from, to] = self.facing(index);
+            let is_first = self.pieces.is_empty() && index + 1 == end;
+            if from > to || (to < 1.0 && !is_first) {
+                break;
+            }
+            self.pieces.push((index, [from, to]));
+            if from > 0.0 {
+                break;
+            }
+        }
+    }
+
+    fn extend_forward(&mut self, start: usize) {
+        for index in start..self.chain.len() {
+            let [from, to] = self.facing(index);
+            if from > to || from > 0.0 {
+                break;
+            }
+            self.pieces.push((index, [from, to]));
+            if to < 1.0 {
+                break;
+            }
+        }
+    }
+
+    /// The fractions of a piece between which it heads forward across the rib; reversed where it nowhere does.
+    fn facing(&self, index: usize) -> [f64; 2] {
+        let (heading, turn) = (
+            self.chain[index].heading - self.angle,
+            self.chain[index].curve.turn(),
+        );
+        if turn == 0.0 {
+            return if heading.abs() < FRAC_PI_2 {
+                [0.0, 1.0]
+            } else {
+                [1.0, 0.0]
+            };
+        }
+        let [a, b] = [-FRAC_PI_2, FRAC_PI_2].map(|bound| (bound - heading) / turn);
+        [a.min(b).max(0.0), a.max(b).min(1.0)]
+    }
+
+    /// Where the line of a rib through a flat point meets the edge; where it passes beyond, its nearest approach.
+    fn end(&self, point: &Vector2<f64>, tolerance: f64) -> End {
+        self.hit(point, tolerance)
+            .unwrap_or_else(|| self.graze(point))
+    }
+
+    fn hit(&self, point: &Vector2<f64>, tolerance: f64) -> Option<End> {
+        match self.on_piece(point) {
+            Some(end) => Some(self.snapped(end, point, tolerance)),
+            None => self.at_tip(point, tolerance),
+        }
+    }
+
+    /// Distance of a flat point from the rib's line, forwards.
+    fn ahead(&self, point: &Vector2<f64>, of: &Vector2<f64>) -> f64 {
+        direction(self.angle).dot(&(point - of))
+    }
+
+    fn end_at(&self, index: usize, fraction: f64) -> End {
+        End {
+            v: 0.0,
+            flat: self.chain[index].curve.point(fraction),
+            place: index as f64 + fraction,
+        }
+    }
+
+    /// The end put on a vertex within the tolerance.
+    ///
+    /// A rib along an end line, but for the tolerance, ends at the corner: where it would meet the edge, prolonged,
+    /// counts.
+    fn snapped(&self, end: End, point: &Vector2<f64>, tolerance: f64) -> End {
+        let index = (end.place.floor() as usize).min(self.chain.len() - 1);
+        let mut corners = [0.0, 1.0].map(|at| self.end_at(index, at)).into_iter();
+        let is_near = |corner: &End| (corner.flat - end.flat).norm() <= tolerance;
+        let along_end_line = || {
+            let (corner, heading) = self.corner_of_end_line(index)?;
+            let reach = tolerance * (heading - self.angle).cos();
+            (self.ahead(&corner.flat, point).abs() <= reach).then_some(corner)
+        };
+        along_end_line()
+            .or_else(|| corners.find(is_near))
+            .unwrap_or(end)
+    }
+
+    /// The corner at which an end line meets the edge, and the heading of the edge there.
+    fn corner_of_end_line(&self, index: usize) -> Option<(End, f64)> {
+        let last = self.chain.len() - 1;
+        if !self.is_open || (index != 0 && index != last) {
+            return None;
+        }
+        let edge = |index: usize| self.chain[index];
+        Some(match index {
+            0 => (self.end_at(1, 0.0), edge(1).heading),
+            _ => (
+                self.end_at(last, 0.0),
+                edge(last - 1).heading + edge(last - 1).curve.turn(),
+            ),
+        })
+    }
+
+    /// The first or the last point of the window, if the line passes it within the tolerance.
+    fn at_tip(&self, point: &Vector2<f64>, tolerance: f64) -> Option<End> {
+        let first = self
+            .pieces
+            .first()
+            .map(|&(index, [from, _])| self.end_at(index, from));
+        let last = self
+            .pieces
+            .last()
+            .map(|&(index, [_, to])| self.end_at(index, to));
+        let is_near = |tip: &End| self.ahead(&tip.flat, point).abs() <= tolerance;
+        [first, last].into_iter().flatten().find(is_near)
+    }
+
+    /// Where the line crosses the window, if it does: on the first piece that ends ahead of it.
+    fn on_piece(&self, point: &Vector2<f64>) -> Option<End> {
+        let ahead = |index: usize, at: f64| self.ahead(&self.chain[index].curve.point(at), point);
+        let &(first, [start, _]) = self.pieces.first()?;
+        if ahead(first, start) > 0.0 {
+            return None;
+        }
+        let ends_ahead = |&&(index, [_, to]): &&(usize, [f64; 2])| ahead(index, to) >= 0.0;
+        let &(index, [from, to]) = self.pieces.iter().find(ends_ahead)?;
+        let fraction = match self.chain[index].curve.circle() {
+            None => {
+                let (a, b) = (ahead(index, 0.0), ahead(index, 1.0));
+                if a < 0.0 { a / (a - b) } else { 0.0 }
+            }
+            Some(_) => root(|at| ahead(index, at), from, to),
+        };
+        Some(self.end_at(index, fraction))
+    }
+
+    /// The foot of the perpendicular from the nearer end of the window onto the rib's line.
+    fn graze(&self, point: &Vector2<f64>) -> End {
+        let ends = [self.pieces.first(), self.pieces.last()];
+        let nearest = (self.start.min(self.chain.len() - 1), [0.0; 2]);
+        let [first, last] = ends.map(|piece| piece.copied().unwrap_or(nearest));
+        let ends = [
+            self.end_at(first.0, first.1[0]),
+            self.end_at(last.0, last.1[1]),
+        ];
+        let gap = |end: &End| self.ahead(&end.flat, point);
+        let [a, b] = ends;
+        let nearer = if gap(&a).abs() < gap(&b).abs() { a } else { b };
+        End {
+            flat: nearer.flat - gap(&nearer) * direction(self.angle),
+            ..nearer
+        }
+    }
+}
+
+/// The piece of an edge beside a foot, or where it would be, and whether it is there at all.
+fn nearest_piece(chains: &Chains, side: usize, foot: &Foot) -> (usize, bool) {
+    let chain = &chains.edges[side];
+    let ends = usize::from(chains.is_open);
+    let inner = ends..chain.len() - ends;
+    let distance = |&index: &usize| {
+        let edge = &chain[index];
+        let (a, b) = (edge.heading, edge.heading + edge.curve.turn());
+        let heading = foot.flat.heading;
+        (heading - heading.clamp(a.min(b), a.max(b))).abs()
+    };
+    let own = inner
+        .clone()
+        .filter(|&index| chain[index].owner == foot.owner);
+    let nearest = own.min_by(|a, b| distance(a).total_cmp(&distance(b)));
+    let after = || inner.clone().find(|&index| chain[index].owner > foot.owner);
+    match nearest {
+        Some(index) => (index, true),
+        None => (after().unwrap_or(chain.len() - ends), false),
+    }
+}
+
+/// The root of a rising function between a and b.
+fn root(f: impl Fn(f64) -> f64, mut a: f64, mut b: f64) -> f64 {
+    for _ in 0..64 {
+        let middle = 0.5 * (a + b);
+        if f(middle) < 0.0 {
+            a = middle;
+        } else {
+            b = middle;
+        }
+    }
+    0.5 * (a + b)
+}

@@ -1,0 +1,285 @@
+//! How far ribs reach over the board, and which edges they may end on.
+
+use crate::board::feet::{Board, Foot};
+use crate::board::flat::direction;
+use crate::board::outline;
+use crate::strip::ribs::{Edge, FURTHER};
+use crate::strip::spine::{Piece, Spine};
+use nalgebra::Vector2;
+use std::f64::consts::PI;
+
+/// What rounding does to 1 − s v of ribs that just touch.
+const TOUCHING: f64 = 1e-4;
+/// Turn of the outline that is none.
+const STRAIGHT: f64 = 1e-9;
+
+/// The elements of which ribs cross on the board: that in the middle with its neighbours, or those at both ends with each
+/// other. On a straight board they are left to the bound |s| ≤ 2/V.
+///
+/// # Panics
+///
+/// If the spine has no nodes.
+pub(crate) fn crossings(spine: &Spine) -> Vec<usize> {
+    let bends = |piece: &Piece| piece.geodesic() != 0.0 || piece.corner() != 0.0;
+    if !spine.pieces.iter().any(bends) {
+        return Vec::new();
+    }
+    let board = Board::of(spine);
+    let crosses = |element: &usize| {
+        let s = spine.mean_convergence(*element);
+        let ends = board.ends(&middle(spine, &board, *element));
+        ends.iter().any(|end| s * end.v > 1.0 + TOUCHING)
+            || cross(
+                &board,
+                [0, 1].map(|i| board.foot_at_node(spine, element + i)),
+            )
+    };
+    spine.strips().filter(crosses).collect()
+}
+
+/// Whether two ribs cross clearly inside the board: on an arc the bound holds in the middle of an element, and at its
+/// ends only as well as its length allows.
+fn cross(board: &Board, feet: [Foot; 2]) -> bool {
+    const INSIDE: f64 = 0.95;
+    let directions = feet.map(|foot| {
+        let along = Vector2::new(-foot.point.rib_slope, 1.0);
+        foot.flat.global(&along) - foot.flat.position
+    });
+    let gap = feet[1].flat.position - feet[0].flat.position;
+    let parallel = directions[0].perp(&directions[1]);
+    let v = [1, 0].map(|other: usize| gap.perp(&directions[other]) / parallel);
+    parallel != 0.0
+        && feet.iter().zip(v).all(|(foot, v)| {
+            let [minus, plus] = board.ends(foot);
+            (INSIDE * minus.v..INSIDE * plus.v).contains(&v)
+        })
+}
+
+/// Of every flexible element the edges before which its ribs must not cross besides |s| ≤ 2/V: where the outline turns
+/// inwards ribs pass the end of their own edge and reach one farther on, on the −ζ or on the +ζ side; of several it is the
+/// one nearest to a crossing. Last the inner edge of its own arc, which very steep ribs may pass by.
+///
+/// # Panics
+///
+/// If the spine has no nodes.
+pub(crate) fn further_edges(spine: &Spine) -> Vec<(usize, [Option<Edge>; FURTHER])> {
+    let board = Board::of(spine);
+    let edges = |element: usize| {
+        let rib = MiddleRib {
+            foot: middle(spine, &board, element),
+            convergence: spine.mean_convergence(element),
+            length: spine.element_length(element),
+        };
+        let [minus, plus] = [0, 1].map(|side| rib.nearest_edge(&board, side));
+        let own = [0, 1]
+            .into_iter()
+            .find_map(|side| rib.own_arc(&board, side));
+        [minus, plus, own]
+    };
+    spine
+        .strips()
+        .map(|element| (element, edges(element)))
+        .collect()
+}
+
+fn middle(spine: &Spine, board: &Board, element: usize) -> Foot {
+    board.foot_within(spine, element, 0.5 * spine.element_length(element))
+}
+
+/// The rib in the middle of an element, with the s of the element.
+struct MiddleRib {
+    foot: Foot,
+    convergence: f64,
+    length: f64,
+}
+
+/// Which way edges are followed: on the −ζ or the +ζ side, behind or ahead of the foot, as signs.
+#[derive(Clone, Copy)]
+struct Way {
+    side: f64,
+    sense: f64,
+}
+
+impl MiddleRib {
+    /// Of the edges ahead and behind that it may reach, the one at which it is nearest to a crossing.
+    fn nearest_edge(&self, board: &Board, side: usize) -> Option<Edge> {
+        let [behind, own, ahead] = board.edges_beside(side, &self.foot);
+        let side = sign(side);
+        let end = |at: f64| own.first().map_or(0.0, |own| self.direction(own, at));
+        let ahead = self.run(ahead.iter(), end(1.0), Way { side, sense: 1.0 });
+        let behind = self.run(behind.iter().rev(), end(0.0), Way { side, sense: -1.0 });
+        let slack = |edge: &Edge| edge.slack(self.foot.point.rib_slope, self.convergence);
+        let edges = ahead.into_iter().chain(behind);
+        edges.min_by(|a, b| slack(a).total_cmp(&slack(b)))
+    }
+
+    /// The arc beside the foot, if this is its inner side.
+    fn own_arc(&self, board: &Board, side: usize) -> Option<Edge> {
+        let [_, own, _] = board.edges_beside(side, &self.foot);
+        let own = own.first()?;
+        (sign(side) * own.curve.turn() > 0.0).then(|| self.view(own, sign(side), 0.0))?
+    }
+
+    /// The edges that follow each other turning inwards, from a given direction on, as far as ribs of the
+    /// element pass their near ends; the last one may turn outwards itself.
+    fn run<'a>(
+        &self,
+        edges: impl Iterator<Item = &'a outline::Edge>,
+        from: f64,
+        way: Way,
+    ) -> Vec<Edge> {
+        let inwards = way.side * way.sense;
+        let near = if way.sense > 0.0 { 0.0 } else { 1.0 };
+        let nearly = 0.5 * self.length;
+        let mut turned = inwards * from;
+        let mut run = Vec::new();
+        for edge in edges {
+            let [first, last] = [near, 1.0 - near].map(|at| inwards * self.direction(edge, at));
+            let passes = way.sense * self.foot.excess(&edge.curve.point(near)) > -nearly;
+            if first < turned - STRAIGHT || first >= PI || !passes {
+                break;
+            }
+            run.extend(self.view(edge, way.side, near));
+            if last < first {
+                break;
+            }
+            turned = last;
+        }
+        run
+    }
+
+    /// Direction of an edge at a fraction of its length, from that of the spine at the foot.
+    fn direction(&self, edge: &outline::Edge, fraction: f64) -> f64 {
+        edge.direction(fraction) - self.foot.flat.heading
+    }
+
+    /// The part of an edge that faces the foot; of an arc that turns outwards, its tangent at the near end.
+    fn view(&self, edge: &outline::Edge, side: f64, near: f64) -> Option<Edge> {
+        let turn = edge.curve.turn();
+        match edge.curve.circle() {
+            Some((centre, radius)) if side * turn > 0.0 => {
+                let centre = self.foot.flat.local(&centre);
+                let nearest = (-side * centre.x).atan2(side * centre.y);
+                // Tangents that turn farther have the foot on their other side.
+                let most = (radius / centre.norm()).min(1.0).acos();
+                let first = self.direction(edge, if turn > 0.0 { 0.0 } else { 1.0 }) - nearest;
+                let turn = [first.max(-most), (first + turn.abs()).min(most)];
+                (turn[0] < turn[1]).then(|| Edge {
+                    direction: direction(nearest),
+                    distance: side * (centre.norm() - radius),
+                    curvature: side / radius,
+                    turn,
+                })
+            }
+            _ => {
+                let direction = direction(self.direction(edge, near));
+                let point = self.foot.flat.local(&edge.curve.point(near));
+                let distance = direction.perp(&point);
+                // Along the element the distance grows or falls, and 1 − s v stays what it is.
+                let farthest = side * distance + 0.5 * self.length * direction.y.abs();
+                (farthest > 0.0).then(|| Edge::line(direction, distance))
+            }
+        }
+    }
+}
+
+/// −1 of the −ζ side, +1 of the +ζ side.
+fn sign(side: usize) -> f64 {
+    [-1.0, 1.0][side]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::board::samples::{Part, Plan};
+    use approx::assert_relative_eq;
+    use proptest::prelude::*;
+
+    const WIDTH: f64 = 0.1;
+
+    fn ell(angle: f64) -> Spine {
+        let leg = Part::Straight(0.5);
+        Plan::open(WIDTH, &[leg, Part::Corner(angle), leg]).spine()
+    }
+
+    #[test]
+    fn test_inner_edge_beyond_a_corner_is_as_far_as_the_corner_says() {
+        for angle in [0.4f64, 1.0, 1.5] {
+            let spine = ell(angle);
+            let mut seen = 0;
+            for (element, [minus, plus, own]) in further_edges(&spine) {
+                assert_eq!((minus, own), (None, None));
+                let Some(edge) = plus else { continue };
+                let ahead = 0.5 - 0.5 * (spine.u[element] + spine.u[element + 1]);
+                let towards = angle * ahead.signum();
+                assert_relative_eq!(edge.direction, direction(towards), epsilon = 1e-12);
+                let expected = 0.5 * WIDTH - ahead.abs() * angle.sin();
+                assert_relative_eq!(edge.distance, expected, epsilon = 1e-12);
+                seen += 1;
+            }
+            assert!(seen >= 2, "{seen}");
+        }
+    }
+
+    #[test]
+    fn test_steep_ribs_before_a_corner_cross_although_they_do_not_within_half_the_width() {
+        let mut spine = ell(1.0);
+        assert!(crossings(&spine).is_empty());
+        let corner = spine.u.iter().position(|u| *u > 0.4999).unwrap_or(0);
+        let beside = corner - 3..corner;
+        for (share, crosses) in [(0.9, true), (0.3, false)] {
+            let s = share * 2.0 / WIDTH;
+            for node in beside.start..=corner {
+                spine.rib_slope[node] = -0.2 - s * (spine.u[corner] - spine.u[node]);
+            }
+            let found = crossings(&spine);
+            assert_eq!(
+                found.iter().any(|element| beside.contains(element)),
+                crosses
+            );
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn test_slack_is_nought_where_the_rib_ends_on_an_edge(
+            turns in prop::collection::vec((0.1..0.4f64, 0.0..0.9f64, any::<bool>()), 1..4),
+            lean in -0.8..0.8f64,
+            mirror in any::<bool>(),
+        ) {
+            let sign = if mirror { -1.0 } else { 1.0 };
+            let mut parts = vec![Part::Straight(0.3)];
+            for (length, turn, is_corner) in turns {
+                match is_corner {
+                    true => parts.extend([Part::Corner(sign * turn), Part::Straight(length)]),
+                    false => parts.push(Part::Arc(length, sign * turn / length)),
+                }
+            }
+            parts.push(Part::Straight(0.3));
+            let spine = Plan::open(WIDTH, &parts).spine();
+            let board = Board::of(&spine);
+            let side = usize::from(!mirror);
+            for element in spine.strips() {
+                let mut foot = middle(&spine, &board, element);
+                foot.point.rib_slope += lean;
+                let end = board.ends(&foot)[side];
+                let v = end.v;
+                let edge = board.chains.edges[side][end.place as usize];
+                let missed = (edge.curve.point(end.place.fract()) - end.flat).norm();
+                let u = 0.5 * (spine.u[element] + spine.u[element + 1]);
+                // Ribs that may leave through an end line, and those that pass by all edges of their side.
+                if u < 0.2 || u > spine.length() - 0.2 || missed > 1e-6 {
+                    continue;
+                }
+                let rib = MiddleRib { foot, convergence: 1.0 / v, length: 0.0 };
+                let slope = rib.foot.point.rib_slope;
+                let edges = [rib.nearest_edge(&board, side), rib.own_arc(&board, side)];
+                let further = edges.into_iter().flatten().map(|edge| edge.slack(slope, 1.0 / v));
+                let geodesic = spine.pieces[element].geodesic();
+                let own = (geodesic == 0.0).then(|| 1.0 - 0.5 * WIDTH / v.abs());
+                let least = further.chain(own).fold(f64::INFINITY, f64::min);
+                prop_assert!(least.abs() < 1e-4, "{element} {u} {v} {slope} {least}");
+            }
+        }
+    }
+}

@@ -1,0 +1,272 @@
+//! From a problem to an equilibrium.
+
+mod apart;
+pub(crate) mod guess;
+mod intrinsic;
+mod search;
+mod stability;
+
+pub use stability::Stability;
+
+use crate::geometry::{Pose, Wrench};
+use crate::problem::Problem;
+use crate::problem::program::{BeltPoint, BeltProgram};
+use crate::scenario::{SAME_PLACE, Scenario};
+use crate::strip::spine::Spine;
+use guess::{guess, waved};
+use nalgebra::{Vector2, Vector3};
+use serde::Serialize;
+use stagewise::{Inertia, Multipliers, Residuals, Stationary};
+use std::ops::ControlFlow;
+use thiserror::Error;
+
+pub(crate) use intrinsic::{is_settled, of_solution};
+
+/// How a solve ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Status {
+    /// All residuals are within the tolerance.
+    Converged,
+    /// No shape of the belt can meet the supports.
+    Infeasible,
+    /// The search ended without meeting the tolerance.
+    NotConverged,
+}
+
+/// What a support does to the belt.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reaction {
+    /// Arc length of the support from the start.
+    pub at: f64,
+    /// Force and moment on the belt about the support point: the gradient of the least energy by the support's
+    /// translation and left, world-axes rotation.
+    pub wrench: Wrench,
+}
+
+/// What a link does to the belt.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LinkForce {
+    /// Force on the belt at the link's point `to`, world axes; at `from` acts the opposite.
+    pub force: Vector3<f64>,
+}
+
+/// The outcome of a solve, in the units of its scenario.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Equilibrium {
+    /// What was solved.
+    pub(crate) problem: Problem,
+    /// How the solve ended.
+    pub status: Status,
+    /// One line for people: how it ended, and what to try.
+    pub message: String,
+    /// What should be known before the result is relied on, one line each.
+    pub warnings: Vec<String>,
+    /// Total potential, loads included.
+    pub energy: f64,
+    /// Elastic energy alone.
+    pub elastic_energy: f64,
+    /// The shape.
+    pub spine: Spine,
+    /// Torsion ω_η at every node.
+    pub torsion: Vec<f64>,
+    /// What the belt beyond every node does to the part before it; empty where the method knows no forces.
+    pub internal: Vec<Wrench>,
+    /// What each support does to the belt, in the order of the scenario; empty where the method knows no forces.
+    pub reactions: Vec<Reaction>,
+    /// What each link does to the belt, in the order of the scenario.
+    pub links: Vec<LinkForce>,
+    /// Signed half turns of a closed belt as it ended, `None` of an open one.
+    pub half_turns: Option<i32>,
+    /// The second variation, where it can be decided.
+    pub stability: Option<Stability>,
+    /// How far the shape is from a solution of its discrete equations, lengths in U and energy in mean R_f/U.
+    pub residuals: Residuals,
+    /// Iterations, over all attempts.
+    pub iterations: usize,
+    /// The programme that was solved; `None` where the method knows no multipliers.
+    pub(crate) solved: Option<Solved>,
+}
+
+/// Why a result is no equilibrium that more can be computed from: no modes, no derivatives, no continuation.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum Uncertified {
+    /// The method of the solve has no first-order conditions that its result meets.
+    #[error(
+        "the source's method knows no multipliers, so that its result is no equilibrium: use solver.method = \"intrinsic\""
+    )]
+    NoMultipliers,
+    /// The solve has not converged.
+    #[error(
+        "the solve has not converged and leaves nothing to follow or to differentiate: {message}"
+    )]
+    NotConverged {
+        /// How the solve ended.
+        message: String,
+    },
+}
+
+/// A programme and its solution.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Solved {
+    pub(crate) program: BeltProgram,
+    pub(crate) at: Stationary<BeltPoint>,
+    pub(crate) inertia: Option<Inertia>,
+    /// The supports and links whose constraints are redundant, by name.
+    pub(crate) redundant: Option<String>,
+    /// Whether a part of the belt has stayed flat under load.
+    pub(crate) is_flat: bool,
+}
+
+impl Equilibrium {
+    /// What was solved.
+    pub fn problem(&self) -> &Problem {
+        &self.problem
+    }
+
+    /// The input, normalised.
+    pub fn scenario(&self) -> &Scenario {
+        self.problem.scenario()
+    }
+
+    /// The programme and its solution, where the solve has converged by a method that knows multipliers: what every
+    /// further computation starts from.
+    ///
+    /// # Errors
+    ///
+    /// [`Uncertified`] otherwise.
+    pub(crate) fn certified(&self) -> Result<&Solved, Uncertified> {
+        let solved = self.solved.as_ref().ok_or(Uncertified::NoMultipliers)?;
+        match self.status {
+            Status::Converged => Ok(solved),
+            Status::Infeasible | Status::NotConverged => Err(Uncertified::NotConverged {
+                message: self.message.clone(),
+            }),
+        }
+    }
+
+    /// The longest way in U from a node to the same place of the same belt in another shape.
+    pub(crate) fn displacement(&self, other: &Self) -> f64 {
+        let length = self.spine.length();
+        let u = &other.spine.u;
+        let way = |(at, pose): (&f64, &Pose)| {
+            let next = u.partition_point(|u| *u < at - SAME_PLACE * length);
+            let next = next.clamp(1, u.len() - 1);
+            let share = ((at - u[next - 1]) / (u[next] - u[next - 1])).clamp(0.0, 1.0);
+            let [a, b] = [next - 1, next].map(|k| other.spine.pose[k].position);
+            (a.lerp(&b, share) - pose.position).norm() / length
+        };
+        let places = self.spine.u.iter().zip(&self.spine.pose);
+        places.map(way).fold(0.0, f64::max)
+    }
+
+    /// The same equilibrium, minimum or not, on a mesh of another number of elements; `None` where none is found next to it,
+    /// and where a scenario may not have so many elements.
+    ///
+    /// `proceed` is asked once an iteration whether to go on.
+    pub fn refined(
+        &self,
+        elements: usize,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Option<Self> {
+        /// Farther off, in U, it is another one.
+        const NEAR: f64 = 0.1;
+        let solved = self.solved.as_ref()?;
+        let problem = self.problem.with_elements(elements).ok()?;
+        let program = problem.program(elements);
+        let shape = search::prolong(&solved.program, &solved.at.point, &program);
+        if self.stability.is_none_or(|s| s.negative_modes == 0) {
+            let found = minimum_next_to(&problem, &shape, proceed);
+            let is_near = self.displacement(&found) <= NEAR;
+            return (found.status == Status::Converged && is_near).then_some(found);
+        }
+        let (from, multipliers) = (&solved.program, &solved.at.multipliers);
+        let at = Stationary {
+            point: shape,
+            multipliers: Multipliers {
+                equalities: multipliers.equalities.clone(),
+                inequalities: search::prolong_inequalities(
+                    from,
+                    &multipliers.inequalities,
+                    &program,
+                ),
+            },
+        };
+        let solution = stagewise::settle(&program, problem.tolerance(), at)?;
+        let is_like = solution.inertia == solved.inertia;
+        is_like.then(|| of_solution(&problem, program, solution))
+    }
+}
+
+/// Where a search begins.
+#[derive(Clone, Copy)]
+enum Start<'a> {
+    /// At the guess.
+    Guess,
+    /// At a shape near to a minimum; anew where that leads to none.
+    Near(&'a BeltPoint),
+    /// At a shape that need not be near to any, and nowhere else.
+    Shape(&'a BeltPoint),
+    /// At a shape very near to a minimum, and nowhere else.
+    Close(&'a BeltPoint),
+}
+
+/// The equilibrium of a problem that is found from the guess.
+///
+/// `proceed` is asked once an iteration whether to go on.
+pub(crate) fn from_guess(
+    problem: &Problem,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Equilibrium {
+    intrinsic::solve(problem, Start::Guess, proceed)
+}
+
+/// The minimum that is found from bend and rib slope at equal steps of the arc length, and from nowhere else.
+pub(crate) fn from_fields(
+    problem: &Problem,
+    bend: &[f64],
+    rib_slope: &[f64],
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Equilibrium {
+    let program = problem.program(problem.elements());
+    let guess = guess(&program, &problem.bulge());
+    let length = problem.units().length;
+    let shape = waved(&program, &guess, 0.0, &|u| {
+        let at = |values: &[f64]| {
+            let place = u * (values.len() - 1) as f64;
+            let before = (place as usize).min(values.len() - 2);
+            let share = place - before as f64;
+            values[before] + share * (values[before + 1] - values[before])
+        };
+        Vector2::new(at(bend) * length, at(rib_slope))
+    });
+    minimum_from(problem, &shape, proceed)
+}
+
+/// The equilibrium from a shape on the problem's mesh that is near to a minimum; anew where it leads to none.
+pub(crate) fn solve_near(
+    problem: &Problem,
+    shape: &BeltPoint,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Equilibrium {
+    intrinsic::solve(problem, Start::Near(shape), proceed)
+}
+
+/// The minimum that a search finds from a shape on the problem's mesh, and from nowhere else.
+pub(crate) fn minimum_from(
+    problem: &Problem,
+    shape: &BeltPoint,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Equilibrium {
+    intrinsic::solve(problem, Start::Shape(shape), proceed)
+}
+
+/// The minimum next to a shape on the problem's mesh.
+pub(crate) fn minimum_next_to(
+    problem: &Problem,
+    shape: &BeltPoint,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Equilibrium {
+    intrinsic::solve(problem, Start::Close(shape), proceed)
+}

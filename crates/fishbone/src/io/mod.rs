@@ -1,0 +1,3 @@
+//! What is written: results as JSON.
+
+pub mod result;

@@ -1,0 +1,392 @@
+//! What holds a node: positions, frames, hinges, Eq. (35), (36).
+
+use super::{NodeMatrix, Rows, RowsByNode};
+use crate::geometry::{Pose, carried_hessian, hat};
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+
+/// What of a node's frame is prescribed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Hold {
+    /// Nothing.
+    Free,
+    /// All of it.
+    Frame(UnitQuaternion<f64>),
+    /// All but the turn about one of its own axes.
+    Hinge {
+        /// The frame that the node's is a turn away from.
+        frame: UnitQuaternion<f64>,
+        /// Which body axis: 0, 1, 2 for ξ, η, ζ.
+        axis: usize,
+    },
+}
+
+impl Hold {
+    /// The prescribed frame, free to turn about an axis or not.
+    pub fn frame(&self) -> Option<UnitQuaternion<f64>> {
+        match self {
+            Self::Free => None,
+            Self::Frame(frame) | Self::Hinge { frame, .. } => Some(*frame),
+        }
+    }
+}
+
+/// Conditions at one node.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NodeSupport {
+    /// Which node.
+    pub node: usize,
+    /// Prescribed position, Eq. (35), each component or none.
+    pub position: [Option<f64>; 3],
+    /// Prescribed frame, Eq. (36).
+    pub hold: Hold,
+    /// Whether the rib is square there, β = 0.
+    pub square_rib: bool,
+}
+
+/// The rotation from the prescribed frame to the present one as modified Rodrigues parameters `4 tan(θ/4) axis`, with
+/// derivatives by the body rotation.
+///
+/// Like the rotation vector near zero, and zero at no other rotation. Unlike the rotation vector and the skew part of
+/// the matrix they have regular derivatives up to and at a half-turn, where the shorter of the two turns changes side.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct RotationGap {
+    scalar: f64,
+    vector: Vector3<f64>,
+}
+
+impl RotationGap {
+    pub(super) fn new(prescribed: &UnitQuaternion<f64>, frame: &Matrix3<f64>) -> Self {
+        let now = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(*frame));
+        let gap = prescribed.conjugate() * now;
+        // At a half-turn rounding must not choose between its two sides.
+        const HALF_TURN: f64 = 1e-9;
+        let decisive = match gap.w.abs() > HALF_TURN {
+            true => gap.w,
+            false => gap.imag()[gap.imag().iamax()],
+        };
+        let sign = 1f64.copysign(decisive);
+        Self {
+            scalar: sign * gap.w,
+            vector: sign * gap.imag(),
+        }
+    }
+
+    pub(super) fn value(&self) -> Vector3<f64> {
+        4.0 * self.vector / (1.0 + self.scalar)
+    }
+
+    pub(super) fn jacobian(&self) -> Matrix3<f64> {
+        let denominator = 1.0 + self.scalar;
+        let by_rotation = self.scalar * Matrix3::identity() + hat(&self.vector);
+        2.0 / denominator * by_rotation
+            + 2.0 / (denominator * denominator) * self.vector * self.vector.transpose()
+    }
+
+    /// Second derivative of `weights · value`.
+    fn hessian(&self, weights: &Vector3<f64>) -> Matrix3<f64> {
+        let denominator = 1.0 + self.scalar;
+        let numerator = weights.dot(&self.vector);
+        let numerator_by = 0.5 * (self.scalar * weights + weights.cross(&self.vector));
+        let denominator_by = -0.5 * self.vector;
+        let mixed = numerator_by * denominator_by.transpose();
+        let isotropic = -0.25 * numerator / denominator
+            + 0.25 * numerator * self.scalar / (denominator * denominator);
+        4.0 * (isotropic * Matrix3::identity() - (mixed + mixed.transpose()) / denominator.powi(2)
+            + 2.0 * numerator / denominator.powi(3) * denominator_by * denominator_by.transpose())
+    }
+}
+
+/// The prescribed axis of a hinge and the present one: stereographic coordinates of the present one, seen from the
+/// prescribed frame, about the prescribed one.
+///
+/// Zero where the axes agree and nowhere else; regular unless they oppose each other.
+#[derive(Debug, Clone, Copy)]
+struct AxisGap {
+    axis: usize,
+    /// The present body axis by the prescribed frame.
+    seen: Vector3<f64>,
+    /// From body axes to those of the prescribed frame.
+    to_prescribed: Matrix3<f64>,
+}
+
+/// A linear function of the seen axis with its derivatives by the body rotation.
+struct Seen {
+    value: f64,
+    gradient: Vector3<f64>,
+    hessian: Matrix3<f64>,
+}
+
+impl AxisGap {
+    fn new(prescribed: &UnitQuaternion<f64>, axis: usize, frame: &Matrix3<f64>) -> Self {
+        let to_prescribed = prescribed.to_rotation_matrix().matrix().transpose() * frame;
+        Self {
+            axis,
+            seen: to_prescribed.column(axis).into_owned(),
+            to_prescribed,
+        }
+    }
+
+    /// The two axes square to the hinge's.
+    fn square(&self) -> [usize; 2] {
+        [(self.axis + 1) % 3, (self.axis + 2) % 3]
+    }
+
+    fn value(&self) -> Vector3<f64> {
+        let [b, c] = self.square();
+        let denominator = 1.0 + self.seen[self.axis];
+        Vector3::new(self.seen[b], self.seen[c], 0.0) * (2.0 / denominator)
+    }
+
+    fn along(&self, direction: &Vector3<f64>) -> Seen {
+        let axis = Vector3::ith(self.axis, 1.0);
+        let direction = self.to_prescribed.tr_mul(direction);
+        let outer = axis * direction.transpose();
+        Seen {
+            value: direction[self.axis],
+            gradient: axis.cross(&direction),
+            hessian: 0.5 * (outer + outer.transpose()) - direction[self.axis] * Matrix3::identity(),
+        }
+    }
+
+    fn jacobian(&self) -> Matrix3<f64> {
+        let own = self.along(&Vector3::ith(self.axis, 1.0));
+        let denominator = 1.0 + own.value;
+        let mut rows = Matrix3::zeros();
+        for (row, other) in self.square().into_iter().enumerate() {
+            let seen = self.along(&Vector3::ith(other, 1.0));
+            let gradient = seen.gradient / denominator
+                - seen.value / (denominator * denominator) * own.gradient;
+            rows.row_mut(row).copy_from(&(2.0 * gradient).transpose());
+        }
+        rows
+    }
+
+    /// Second derivative of `weights · value`.
+    fn hessian(&self, weights: &Vector3<f64>) -> Matrix3<f64> {
+        let own = self.along(&Vector3::ith(self.axis, 1.0));
+        let [b, c] = self.square();
+        let seen = self.along(&(Vector3::ith(b, weights[0]) + Vector3::ith(c, weights[1])));
+        let d = 1.0 + own.value;
+        let mixed = seen.gradient * own.gradient.transpose();
+        2.0 * (seen.hessian / d
+            - (mixed + mixed.transpose() + seen.value * own.hessian) / d.powi(2)
+            + 2.0 * seen.value / d.powi(3) * own.gradient * own.gradient.transpose())
+    }
+}
+
+/// How far the present frame is from what is prescribed of it.
+enum Gap {
+    None,
+    Rotation(RotationGap),
+    Axis(AxisGap),
+}
+
+impl Gap {
+    fn value(&self) -> Vector3<f64> {
+        match self {
+            Self::None => Vector3::zeros(),
+            Self::Rotation(gap) => gap.value(),
+            Self::Axis(gap) => gap.value(),
+        }
+    }
+
+    fn jacobian(&self) -> Matrix3<f64> {
+        match self {
+            Self::None => Matrix3::zeros(),
+            Self::Rotation(gap) => gap.jacobian(),
+            Self::Axis(gap) => gap.jacobian(),
+        }
+    }
+
+    fn hessian(&self, weights: &Vector3<f64>) -> Matrix3<f64> {
+        match self {
+            Self::None => Matrix3::zeros(),
+            Self::Rotation(gap) => gap.hessian(weights),
+            Self::Axis(gap) => gap.hessian(weights),
+        }
+    }
+}
+
+/// How a support's conditions on a frame answer to turns of it, left and in world axes.
+///
+/// They depend on how the frame is turned from the prescribed one and on nothing else.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Turn {
+    /// Derivative of the conditions.
+    pub(crate) jacobian: Matrix3<f64>,
+    /// Derivative of multipliers times conditions.
+    pub(crate) pull: Vector3<f64>,
+    /// Its second derivative along single turns.
+    pub(crate) hessian: Matrix3<f64>,
+}
+
+impl NodeSupport {
+    /// The prescribed position, where all of it is.
+    pub fn point(&self) -> Option<Vector3<f64>> {
+        let [x, y, z] = self.position;
+        Some(Vector3::new(x?, y?, z?))
+    }
+
+    /// The components of a vector along which the position is held.
+    pub(crate) fn held(&self, vector: &Vector3<f64>) -> Vector3<f64> {
+        Vector3::from_fn(|i, _| {
+            if self.position[i].is_some() {
+                vector[i]
+            } else {
+                0.0
+            }
+        })
+    }
+
+    fn gap(&self, pose: &Pose) -> Gap {
+        match &self.hold {
+            Hold::Free => Gap::None,
+            Hold::Frame(frame) => Gap::Rotation(RotationGap::new(frame, &pose.frame)),
+            Hold::Hinge { frame, axis } => Gap::Axis(AxisGap::new(frame, *axis, &pose.frame)),
+        }
+    }
+
+    pub(super) fn value(&self, pose: &Pose) -> Rows {
+        let mut rows = Rows::zeros();
+        for (i, held) in self.components() {
+            rows[i] = pose.position[i] - held;
+        }
+        rows.fixed_rows_mut::<3>(3)
+            .copy_from(&self.gap(pose).value());
+        rows
+    }
+
+    /// Derivative of the values by the node's unknowns, of which the first are a twist in world axes about the origin.
+    pub(super) fn jacobian(&self, pose: &Pose) -> RowsByNode {
+        let mut rows = RowsByNode::zeros();
+        let by_turn = -hat(&pose.position);
+        for (i, _) in self.components() {
+            rows[(i, i)] = 1.0;
+            rows.fixed_view_mut::<1, 3>(i, 3)
+                .copy_from(&by_turn.fixed_rows::<1>(i));
+        }
+        rows.fixed_view_mut::<3, 3>(3, 3)
+            .copy_from(&(self.gap(pose).jacobian() * pose.frame.transpose()));
+        rows
+    }
+
+    /// Second derivative of `multipliers · value` by the node's unknowns.
+    pub(super) fn hessian(&self, pose: &Pose, multipliers: &Rows) -> NodeMatrix {
+        let force = self.held(&multipliers.fixed_rows::<3>(0).into());
+        let mut hessian = NodeMatrix::zeros();
+        hessian
+            .fixed_view_mut::<6, 6>(0, 0)
+            .copy_from(&carried_hessian(&pose.position, &force));
+        let weights = multipliers.fixed_rows::<3>(3).into_owned();
+        let by_turn = self.gap(pose).hessian(&weights);
+        let mut turns = hessian.fixed_view_mut::<3, 3>(3, 3);
+        turns += pose.frame * by_turn * pose.frame.transpose();
+        hessian
+    }
+
+    /// The components of the position that are prescribed.
+    fn components(&self) -> impl Iterator<Item = (usize, f64)> {
+        let components = self.position.into_iter().enumerate();
+        components.filter_map(|(i, held)| Some((i, held?)))
+    }
+
+    /// How the frame's conditions answer to turns.
+    pub(crate) fn turn(&self, pose: &Pose, multipliers: &Rows) -> Turn {
+        let gap = self.gap(pose);
+        let weights = multipliers.fixed_rows::<3>(3).into_owned();
+        let jacobian = gap.jacobian() * pose.frame.transpose();
+        Turn {
+            jacobian,
+            pull: jacobian.tr_mul(&weights),
+            hessian: pose.frame * gap.hessian(&weights) * pose.frame.transpose(),
+        }
+    }
+
+    /// Force and moment of the support on the belt about its point, world axes.
+    pub(crate) fn reaction(&self, pose: &Pose, multipliers: &Rows) -> (Vector3<f64>, Vector3<f64>) {
+        let pull = self.jacobian(pose).tr_mul(multipliers);
+        let force: Vector3<f64> = pull.fixed_rows::<3>(0).into_owned();
+        let moment = pull.fixed_rows::<3>(3) - pose.position.cross(&force);
+        (-force, -moment)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Twist, exp};
+    use nalgebra::Vector6;
+
+    fn frame() -> UnitQuaternion<f64> {
+        UnitQuaternion::from_scaled_axis(Vector3::new(0.3, -0.4, 0.7))
+    }
+
+    fn support(hold: Hold) -> NodeSupport {
+        NodeSupport {
+            node: 0,
+            position: [None; 3],
+            hold,
+            square_rib: false,
+        }
+    }
+
+    fn turned(by: Vector3<f64>) -> Pose {
+        Pose {
+            frame: frame().to_rotation_matrix().into_inner() * exp(&by),
+            position: Vector3::zeros(),
+        }
+    }
+
+    #[test]
+    fn test_derivatives_of_the_gaps_agree_with_finite_differences() {
+        let mut holds: Vec<Hold> = (0..3)
+            .map(|axis| Hold::Hinge {
+                frame: frame(),
+                axis,
+            })
+            .collect();
+        holds.push(Hold::Frame(frame()));
+        let weights = Rows::new(1.1, 0.6, -0.8, 0.7, -1.3, 0.4);
+        let h = 1e-4;
+        for mut support in holds.into_iter().map(support) {
+            support.position = [Some(0.3), None, Some(-0.2)];
+            let at = Pose {
+                position: Vector3::new(0.5, -0.4, 0.8),
+                ..turned(Vector3::new(0.9, -1.1, 0.5))
+            };
+            let moved = |by: Vector6<f64>| {
+                let pose = Pose::exp(&Twist::from_vector(&by)) * at;
+                support.value(&pose).dot(&weights)
+            };
+            let exact = support.jacobian(&at).tr_mul(&weights);
+            let second = support.hessian(&at, &weights);
+            for i in 0..6 {
+                let e_i = h * Vector6::ith(i, 1.0);
+                let difference = (moved(e_i) - moved(-e_i)) / (2.0 * h);
+                assert!((difference - exact[i]).abs() < 1e-7);
+                for j in 0..6 {
+                    let e_j = h * Vector6::ith(j, 1.0);
+                    let difference = (moved(e_i + e_j) - moved(e_i - e_j) - moved(e_j - e_i)
+                        + moved(-e_i - e_j))
+                        / (4.0 * h * h);
+                    assert!((difference - second[(i, j)]).abs() < 1e-6);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn test_hinge_is_met_by_every_turn_about_its_axis_and_by_no_other() {
+        for axis in 0..3 {
+            let support = support(Hold::Hinge {
+                frame: frame(),
+                axis,
+            });
+            let value = |by: Vector3<f64>| support.value(&turned(by)).norm();
+            for angle in [-3.0, -1.0, 0.0, 2.0, 3.1, 6.0] {
+                assert!(value(angle * Vector3::ith(axis, 1.0)) < 1e-14);
+                assert!(value(angle * Vector3::ith((axis + 1) % 3, 1.0)) > 0.1 || angle == 0.0);
+            }
+        }
+    }
+}

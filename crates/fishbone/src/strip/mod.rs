@@ -1,0 +1,7 @@
+//! The strip between neighbouring ribs: its energy, its motion, and the spine that strips make up.
+
+pub mod density;
+pub mod element;
+pub mod kernel;
+pub mod ribs;
+pub mod spine;

@@ -1,0 +1,555 @@
+//! The strip of the board between two neighbouring ribs: where its ribs end, when they cross, what its width adds.
+//!
+//! A strip is known by the rib slope β and by s = β' + κ_g (1+β²): at v it is `1 − v s` times as wide as on the spine.
+
+use nalgebra::{Matrix2, Vector2};
+use num_dual::{Derivative, Dual2SVec64, DualNum};
+use std::ops::{Div, Mul};
+
+/// How fast neighbouring ribs converge towards +v: s = β' + κ_g (1 + β²).
+///
+/// The strip between two ribs is (1 − v s) du wide at v, so ribs meet at v = 1/s. For κ_g = 0 it is the β' of the source.
+///
+/// Source: Eq. (33), extended to curved belts
+pub fn rib_convergence(slope_rate: f64, geodesic: f64, rib_slope: f64) -> f64 {
+    slope_rate + geodesic * (1.0 + rib_slope * rib_slope)
+}
+
+/// The greatest |s| for which ribs do not cross inside the width, 2/V.
+///
+/// Source: Eq. (33)
+pub fn rib_convergence_bound(width: f64) -> f64 {
+    2.0 / width
+}
+
+/// A number, it may be with derivatives, that numbers of another kind may multiply: the width is mostly a plain one.
+pub trait Scaled<W>:
+    DualNum<Primitive = f64> + Copy + Mul<W, Output = Self> + Div<W, Output = Self>
+{
+}
+
+impl<W, D> Scaled<W> for D where
+    D: DualNum<Primitive = f64> + Copy + Mul<W, Output = D> + Div<W, Output = D>
+{
+}
+
+/// What the density's terms are multiplied by to hold for the whole width: integrals over v from the rib's one end v₋ to
+/// the other v₊, divided by V.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Across<T> {
+    /// ∫ dv / (1 − v s), of the squared curvature.
+    pub bending: T,
+    /// ∫ dv, of the curvature.
+    pub length: T,
+    /// ∫ (1 − v s) dv, of what does not depend on the curvature.
+    pub area: T,
+}
+
+impl Across<f64> {
+    /// The narrow limit, and every straight belt whose ribs are parallel.
+    pub const PLAIN: Self = Self {
+        bending: 1.0,
+        length: 1.0,
+        area: 1.0,
+    };
+}
+
+impl<D: DualNum<Primitive = f64> + Copy> Across<D> {
+    /// Of a straight belt, by y = sV/2.
+    pub fn straight(y: D) -> Self {
+        Self {
+            bending: artanh_ratio(y),
+            ..Across::PLAIN.map(D::from)
+        }
+    }
+}
+
+impl<T: Copy> Across<T> {
+    /// The same in another kind of number.
+    pub fn map<U>(&self, f: impl Fn(T) -> U) -> Across<U> {
+        Across {
+            bending: f(self.bending),
+            length: f(self.length),
+            area: f(self.area),
+        }
+    }
+}
+
+/// A function of the rib slopes at both ends of an element, with its derivatives by them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SlopeJet {
+    /// Value.
+    pub value: f64,
+    /// Gradient.
+    pub gradient: Vector2<f64>,
+    /// Hessian.
+    pub hessian: Matrix2<f64>,
+}
+
+impl SlopeJet {
+    /// A constant.
+    pub fn constant(value: f64) -> Self {
+        Self {
+            value,
+            gradient: Vector2::zeros(),
+            hessian: Matrix2::zeros(),
+        }
+    }
+
+    /// A function of s·V/2 = `rate` (β₁ − β₀), from its derivatives by that.
+    fn of_share(rate: f64, [value, first, second]: [f64; 3]) -> Self {
+        let by = Vector2::new(-rate, rate);
+        Self {
+            value,
+            gradient: first * by,
+            hessian: second * by * by.transpose(),
+        }
+    }
+}
+
+impl From<Dual2SVec64<2>> for SlopeJet {
+    fn from(number: Dual2SVec64<2>) -> Self {
+        Self {
+            value: number.re,
+            gradient: number
+                .v1
+                .unwrap_generic(nalgebra::Const::<1>, nalgebra::Const::<2>)
+                .transpose(),
+            hessian: number
+                .v2
+                .unwrap_generic(nalgebra::Const::<2>, nalgebra::Const::<2>),
+        }
+    }
+}
+
+/// A line or an arc of the board's outline as seen from the foot of a rib, by the tangent nearest to the foot.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Edge<W = f64> {
+    /// Direction of that tangent along and across the spine at the foot, (cos δ, sin δ).
+    pub direction: Vector2<f64>,
+    /// Its distance c from the foot, negative on the −ζ side.
+    pub distance: W,
+    /// Curvature, 0 of a line; towards the side on which the edge lies.
+    pub curvature: W,
+    /// Turns of its first and last tangent from the nearest one, rising.
+    pub turn: [f64; 2],
+}
+
+impl Edge {
+    /// A straight line.
+    pub fn line(direction: Vector2<f64>, distance: f64) -> Self {
+        Self {
+            direction,
+            distance,
+            curvature: 0.0,
+            turn: [0.0; 2],
+        }
+    }
+
+    /// The same edge in other units: lengths times a factor.
+    pub fn scaled(&self, factor: f64) -> Self {
+        Self {
+            distance: self.distance * factor,
+            curvature: self.curvature / factor,
+            ..*self
+        }
+    }
+}
+
+impl<W: DualNum<Primitive = f64> + Copy> Edge<W> {
+    /// How far ribs are from crossing before they reach the edge: the least of `cos δ + β sin δ − s c` over its tangents.
+    ///
+    /// A rib meets a tangent at v = c/(cos δ + β sin δ), so this is 1 − s v in other words; but it counts a rib so
+    /// steep that it passes the edge by as crossing others.
+    pub fn slack<D: Scaled<W>>(&self, slope: D, s: D) -> D {
+        let (along, across) = (self.direction.x, self.direction.y);
+        let nearest = slope * across - s * self.distance + along;
+        if self.curvature.re() == 0.0 {
+            return nearest;
+        }
+        // Over the tangents it is a sine of their turn.
+        let quarter = slope * along - across;
+        let (k, side) = (self.curvature, self.curvature.re().signum());
+        let beyond = s - nearest * k;
+        let lowest = (-quarter.re() * k.re().abs()).atan2(side * beyond.re());
+        if (self.turn[0]..=self.turn[1]).contains(&lowest) {
+            let square = beyond * beyond + quarter * quarter * (k * k);
+            if square.re() == 0.0 {
+                // Ribs that meet in the centre of the arc are as far from all of its tangents.
+                return nearest;
+            }
+            let amplitude = square.sqrt();
+            let squares = nearest * nearest + quarter * quarter;
+            return (nearest * s * 2.0 - squares * k) * side / (s * side + amplitude);
+        }
+        let at = |turn: f64| {
+            nearest * turn.cos() + quarter * turn.sin() + s * (2.0 * (0.5 * turn).sin().powi(2)) / k
+        };
+        let [first, last] = self.turn.map(at);
+        if first < last { first } else { last }
+    }
+}
+
+/// Most edges that bound ribs besides those of their own stretch.
+pub const FURTHER: usize = 3;
+/// Most inequalities of an element: its own edges, then further ones.
+pub const BOUNDS: usize = 2 + FURTHER;
+
+/// The strips of one element: of half the width, in-plane curvature κ_g, and length.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Strips<W = f64> {
+    /// Half the width, V/2.
+    pub half_width: W,
+    /// In-plane curvature κ_g of the flat board.
+    pub geodesic: f64,
+    /// Length along the spine.
+    pub length: f64,
+    /// Edges of the board, besides those of the stretch, before which ribs must not cross either.
+    pub further: [Option<Edge<W>>; FURTHER],
+}
+
+/// An inner edge tighter than this, in V/2, counts as this tight: the true one is trimmed.
+const TIGHTEST: f64 = 0.9;
+
+impl<W: DualNum<Primitive = f64> + Copy> Strips<W> {
+    /// The mean rib slope and the rib measure s = β' + κ_g (1+β²) there, which stands for the whole element.
+    ///
+    /// Source: Eq. (33), extended to curved belts
+    pub fn measure<D: DualNum<Primitive = f64> + Copy>(&self, slopes: [D; 2]) -> (D, D) {
+        let mean = (slopes[0] + slopes[1]) * 0.5;
+        let rise = (slopes[1] - slopes[0]) / self.length;
+        (mean, rise + (mean * mean + 1.0) * self.geodesic)
+    }
+
+    /// How far the ribs are from crossing on the board, by slopes at both ends of the element: `1 − s v` at the +ζ and
+    /// at the −ζ edge of the stretch, then [`Edge::slack`] at the further edges, 1 where there are none.
+    ///
+    /// On an arc v is where the rib meets the inner edge; towards the outer one, which a rib meets before V/2, it is V/2
+    /// all the same, so that |s| ≤ 2/V holds everywhere.
+    ///
+    /// Source: Eq. (33)
+    pub fn slacks<D: Scaled<W> + From<W>>(&self, slopes: [D; 2]) -> [D; BOUNDS] {
+        let (mean, s) = self.measure(slopes);
+        let w = self.half_width;
+        let [minus, plus] = if self.geodesic == 0.0 {
+            [D::from(-w), D::from(w)]
+        } else if self.geodesic > 0.0 {
+            [D::from(-w), self.ends(mean)[1]]
+        } else {
+            [self.ends(mean)[0], D::from(w)]
+        };
+        let further = |edge: &Option<Edge<W>>| match edge {
+            None => D::one(),
+            Some(edge) => edge.slack(mean, s),
+        };
+        let [a, b, c] = self.further.each_ref().map(further);
+        [-s * plus + 1.0, -s * minus + 1.0, a, b, c]
+    }
+
+    /// The places among [`Self::slacks`] of those that bound something: the stretch's own edges, and further ones that there
+    /// are.
+    pub fn bounds(&self) -> impl Iterator<Item = usize> + use<W> {
+        let further = self.further.each_ref().map(Option::is_some);
+        (0..BOUNDS).filter(move |bound| *bound < 2 || further[bound - 2])
+    }
+
+    /// Where the rib of this slope meets the edges, v₋ and v₊: `v − κ_g v² (1+β²)/2 = ±V/2 − κ_g V²/8`.
+    ///
+    /// A rib so steep that it misses the inner edge of its own arc leaves the board farther along; there the root is
+    /// continued smoothly.
+    pub fn ends<D: Scaled<W>>(&self, slope: D) -> [D; 2] {
+        let w = self.half_width;
+        let tightest = W::from(TIGHTEST) / w;
+        let geodesic = match self.geodesic.abs() < tightest.re() {
+            true => W::from(self.geodesic),
+            false => tightest * self.geodesic.signum(),
+        };
+        let stretch = slope * slope + 1.0;
+        [-w, w].map(|edge| {
+            let offset = edge - geodesic * 0.5 * w * w;
+            let root = continued_root(-stretch * (geodesic * 2.0 * offset) + 1.0);
+            (root + 1.0).recip() * (offset * 2.0)
+        })
+    }
+
+    /// What the width makes of the density's terms, by slopes at both ends of the element.
+    pub fn across<D: Scaled<W>>(&self, slopes: [D; 2]) -> Across<D> {
+        let (mean, s) = self.measure(slopes);
+        let [minus, plus] = self.ends(mean);
+        let length = (plus - minus) / (self.half_width * 2.0);
+        let middle = -s * (plus + minus) * 0.5 + 1.0;
+        let share = s * (plus - minus) * 0.5 / middle;
+        Across {
+            bending: length / middle * artanh_ratio(share),
+            length,
+            area: length * middle,
+        }
+    }
+}
+
+impl Strips {
+    /// Whether the slacks are linear in the slopes.
+    pub fn has_linear_bounds(&self) -> bool {
+        self.geodesic == 0.0 && self.further == [None; FURTHER]
+    }
+
+    /// The slacks with derivatives.
+    pub fn slack_jets(&self, slopes: [f64; 2]) -> [SlopeJet; BOUNDS] {
+        if self.has_linear_bounds() {
+            let rate = self.half_width / self.length;
+            let y = rate * (slopes[1] - slopes[0]);
+            let [plus, minus] =
+                [-1.0, 1.0].map(|sign| SlopeJet::of_share(rate, [1.0 + sign * y, sign, 0.0]));
+            let none = SlopeJet::constant(1.0);
+            return [plus, minus, none, none, none];
+        }
+        self.slacks(variables(slopes)).map(SlopeJet::from)
+    }
+
+    /// What the width makes of the density's terms, with derivatives.
+    pub fn across_jets(&self, slopes: [f64; 2]) -> Across<SlopeJet> {
+        if self.geodesic == 0.0 {
+            let rate = self.half_width / self.length;
+            let y = rate * (slopes[1] - slopes[0]);
+            return Across {
+                bending: SlopeJet::of_share(rate, artanh_ratio_with_derivatives(y)),
+                ..Across::PLAIN.map(SlopeJet::constant)
+            };
+        }
+        self.across(variables(slopes)).map(SlopeJet::from)
+    }
+}
+
+/// Two numbers that carry their first and second derivatives along.
+fn variables(at: [f64; 2]) -> [Dual2SVec64<2>; 2] {
+    let [mut first, mut second] = at.map(Dual2SVec64::from);
+    first.v1 = Derivative::derivative_generic(nalgebra::Const::<1>, nalgebra::Const::<2>, 0);
+    second.v1 = Derivative::derivative_generic(nalgebra::Const::<1>, nalgebra::Const::<2>, 1);
+    [first, second]
+}
+
+/// √t, continued below a small t, two derivatives and all, by what stays positive: a square root would end at 0.
+fn continued_root<D: DualNum<Primitive = f64> + Copy>(t: D) -> D {
+    const SMALL: f64 = 0.01;
+    if t >= SMALL {
+        return t.sqrt();
+    }
+    let below = t / SMALL - 1.0;
+    (below * 0.5 - below * below * 0.25).exp() * SMALL.sqrt()
+}
+
+/// Below this y² the closed form of artanh(y)/y cancels, and the series Σ y²ⁿ/(2n+1) is exact in [`TERMS`] terms.
+const SERIES_BELOW: f64 = 0.04;
+const TERMS: i32 = 14;
+
+/// artanh(y)/y.
+fn artanh_ratio<D: DualNum<Primitive = f64> + Copy>(y: D) -> D {
+    let square = y * y;
+    if square < SERIES_BELOW {
+        let term = |sum: D, n: i32| sum * square + 1.0 / f64::from(2 * n + 1);
+        return (0..TERMS).rev().fold(D::zero(), term);
+    }
+    (y.ln_1p() - (-y).ln_1p()) / y * 0.5
+}
+
+/// artanh(y)/y and its first two derivatives.
+fn artanh_ratio_with_derivatives(y: f64) -> [f64; 3] {
+    let square = y * y;
+    if square < SERIES_BELOW {
+        return artanh_ratio_series(y);
+    }
+    let inverse = 1.0 / (1.0 - square);
+    let g = artanh_ratio(y);
+    let g1 = (inverse - g) / y;
+    let g2 = 2.0 * (inverse * inverse - g1 / y);
+    [g, g1, g2]
+}
+
+/// The same from the series.
+fn artanh_ratio_series(y: f64) -> [f64; 3] {
+    let square = y * y;
+    let (mut g1, mut g2) = (0.0, 0.0);
+    for n in (1..TERMS).rev() {
+        let (order, coefficient) = (f64::from(2 * n), 1.0 / f64::from(2 * n + 1));
+        g1 = g1 * square + order * coefficient;
+        g2 = g2 * square + order * (order - 1.0) * coefficient;
+    }
+    [artanh_ratio(y), g1 * y, g2]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use num_dual::hessian;
+
+    fn strips(geodesic: f64) -> Strips {
+        Strips {
+            half_width: 0.05,
+            geodesic,
+            length: 0.0125,
+            further: [None; FURTHER],
+        }
+    }
+
+    /// Pairs of slopes from which the ribs do not cross.
+    const SLOPES: [[f64; 2]; 5] = [
+        [0.0, 0.0],
+        [0.3, 0.3 + 1e-9],
+        [-0.5, -0.56],
+        [0.9, 1.02],
+        [0.05, -0.05],
+    ];
+
+    #[test]
+    fn test_width_factor_is_the_mean_over_the_width_of_the_local_curvature() {
+        // Across the width the curvature is κ₁/(1 − vs); dA = (1 − vs) dv du.
+        for geodesic in [0.0, 1.4, -6.0] {
+            let strips = strips(geodesic);
+            for slopes in SLOPES {
+                let (mean, s) = strips.measure(slopes);
+                let [minus, plus] = strips.ends(mean);
+                let n = 100_000;
+                let step = (plus - minus) / f64::from(n);
+                let sum = |f: &dyn Fn(f64) -> f64| -> f64 {
+                    (0..n)
+                        .map(|i| f(minus + (f64::from(i) + 0.5) * step) * step / 0.1)
+                        .sum()
+                };
+                let across = strips.across(slopes);
+                assert!((across.bending - sum(&|v| 1.0 / (1.0 - v * s))).abs() < 1e-7);
+                assert!((across.area - sum(&|v| 1.0 - v * s)).abs() < 1e-10);
+                assert!((across.length - sum(&|_| 1.0)).abs() < 1e-10);
+            }
+        }
+    }
+
+    #[test]
+    fn test_ribs_end_on_the_edges_of_the_arc() {
+        for geodesic in [1.4, -3.0, 12.0] {
+            for slope in [0.0f64, 0.2, -0.4] {
+                let centre = 1.0 / geodesic;
+                for (v, edge) in strips(geodesic).ends(slope).into_iter().zip([-0.05, 0.05]) {
+                    let distance = (slope * v).hypot(centre - v);
+                    assert!((distance - (centre - edge).abs()).abs() < 1e-14);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn test_rib_meets_the_inner_edge_beyond_half_the_width_and_the_outer_before() {
+        for geodesic in [1.4, 12.0, 19.0, 300.0] {
+            for slope in [0.0f64, 0.3, -0.7, 2.0, -9.0] {
+                let [minus, plus] = strips(geodesic).ends(slope);
+                assert!(plus >= 0.05 * (1.0 - 1e-12) && minus >= -0.05 * (1.0 + 1e-12));
+                assert!(plus < 0.12 && minus < 0.0);
+                let mirrored = strips(-geodesic).ends(slope);
+                assert!((mirrored[0] + plus).abs() < 1e-15 && (mirrored[1] + minus).abs() < 1e-15);
+            }
+        }
+    }
+
+    #[test]
+    fn test_slack_at_an_edge_is_the_least_over_its_tangents() {
+        // By the points of the arc and their tangents, from a centre and a radius.
+        for (curvature, nearest, distance) in [(4.0f64, 0.3f64, 0.05f64), (-9.0, -0.8, -0.03)] {
+            let edge = Edge {
+                direction: Vector2::new(nearest.cos(), nearest.sin()),
+                distance,
+                curvature,
+                turn: [-0.6, 0.5],
+            };
+            let radius = 1.0 / curvature;
+            let left = |angle: f64| Vector2::new(-angle.sin(), angle.cos());
+            let centre = (distance + radius) * left(nearest);
+            for slope in [-1.5, -0.2, 0.0, 0.7, 2.0] {
+                for s in [-30.0, -12.0, -1.0, 0.0, 3.0, 15.0, 25.0] {
+                    let at = |i: i32| {
+                        let angle = nearest - 0.6 + 1.1 * f64::from(i) / 4000.0;
+                        let point = centre - radius * left(angle);
+                        let c = left(angle).dot(&point);
+                        angle.cos() + slope * angle.sin() - s * c
+                    };
+                    let least = (0..=4000).map(at).fold(f64::INFINITY, f64::min);
+                    assert!((edge.slack(slope, s) - least).abs() < 1e-5, "{slope} {s}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn test_ribs_that_meet_in_the_centre_of_an_arc_are_as_far_from_all_of_it() {
+        let edge = Edge {
+            direction: Vector2::x(),
+            distance: 0.05,
+            curvature: 1.0 / 0.2,
+            turn: [-0.3, 0.3],
+        };
+        let [slope, s] = variables([0.0, 4.0]);
+        let jet = SlopeJet::from(edge.slack(slope, s));
+        assert!((jet.value - 0.8).abs() < 1e-15 && jet.gradient.amax().is_finite());
+    }
+
+    #[test]
+    fn test_arc_of_no_curvature_is_straight() {
+        for slopes in SLOPES {
+            let (flat, bent) = (strips(0.0), strips(1e-9));
+            for (a, b) in [
+                (
+                    flat.across_jets(slopes).bending,
+                    bent.across_jets(slopes).bending,
+                ),
+                (flat.across_jets(slopes).area, bent.across_jets(slopes).area),
+                (flat.slack_jets(slopes)[0], bent.slack_jets(slopes)[0]),
+                (flat.slack_jets(slopes)[1], bent.slack_jets(slopes)[1]),
+            ] {
+                assert!((a.value - b.value).abs() < 1e-9);
+                assert!((a.gradient - b.gradient).amax() < 1e-7 * a.gradient.amax().max(1.0));
+                assert!((a.hessian - b.hessian).amax() < 1e-7 * a.hessian.amax().max(1.0));
+            }
+        }
+    }
+
+    #[test]
+    fn test_derivatives_agree_with_automatic_differentiation() {
+        for geodesic in [0.0, 1.4, -6.0] {
+            let strips = strips(geodesic);
+            for slopes in SLOPES {
+                let check =
+                    |jet: SlopeJet, value: &dyn Fn([Dual2SVec64<2>; 2]) -> Dual2SVec64<2>| {
+                        let (value, gradient, second) =
+                            hessian(|x: Vector2<_>| value([x[0], x[1]]), &Vector2::from(slopes));
+                        assert!((jet.value - value).abs() <= 1e-13 * value.abs());
+                        assert!(
+                            (jet.gradient - gradient).amax() <= 1e-11 * gradient.amax().max(1e-3)
+                        );
+                        assert!((jet.hessian - second).amax() <= 1e-9 * second.amax().max(1e-3));
+                    };
+                let across = strips.across_jets(slopes);
+                check(across.bending, &|x| strips.across(x).bending);
+                check(across.length, &|x| strips.across(x).length);
+                check(across.area, &|x| match geodesic == 0.0 {
+                    true => Dual2SVec64::from(1.0),
+                    false => strips.across(x).area,
+                });
+                check(strips.slack_jets(slopes)[0], &|x| strips.slacks(x)[0]);
+                check(strips.slack_jets(slopes)[1], &|x| strips.slacks(x)[1]);
+            }
+        }
+    }
+
+    #[test]
+    fn test_energy_grows_without_bound_where_ribs_meet_at_an_edge() {
+        let factor = |y: f64| artanh_ratio(y);
+        assert!(factor(0.999_999) > factor(0.99) && factor(0.99) > 2.0 * factor(0.0));
+    }
+
+    #[test]
+    fn test_continued_root_has_no_kink() {
+        let h = 1e-4;
+        let root = |t: f64| continued_root(t);
+        let second = |t: f64| (root(t + h) - 2.0 * root(t) + root(t - h)) / (h * h);
+        assert!((second(0.01 - 1e-9) / second(0.01 + 2.0 * h) - 1.0).abs() < 0.1);
+        assert!(root(-0.05) > 0.0 && (root(0.0099999) - root(0.0100001)).abs() < 1e-5);
+    }
+}

@@ -1,0 +1,371 @@
+//! The solved centre line with its ribs: what the surface and every report are drawn from.
+
+use crate::geometry::{Pose, exp};
+use crate::strip::element::{increment, torsion};
+use crate::strip::ribs::rib_convergence;
+use nalgebra::{Vector3, Vector4};
+
+/// What joins a node of the spine to the next one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Piece {
+    /// A flexible stretch.
+    Strip {
+        /// In-plane curvature κ_g of the flat board.
+        geodesic: f64,
+    },
+    /// A stiffened stretch, straight and flat.
+    Rigid,
+    /// A place of no length where the fields may jump.
+    Joint {
+        /// Angle χ by which the board turns there, from η towards ζ; 0 but at a corner.
+        angle: f64,
+    },
+}
+
+impl Piece {
+    /// In-plane curvature κ_g of the flat board along it.
+    pub fn geodesic(self) -> f64 {
+        match self {
+            Self::Strip { geodesic } => geodesic,
+            Self::Rigid | Self::Joint { .. } => 0.0,
+        }
+    }
+
+    /// Angle by which the board turns at a point, from η towards ζ.
+    pub fn corner(self) -> f64 {
+        match self {
+            Self::Joint { angle } => angle,
+            Self::Rigid | Self::Strip { .. } => 0.0,
+        }
+    }
+}
+
+/// The spine at its nodes, in the units of the scenario.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Spine {
+    /// Width V of the belt.
+    pub width: f64,
+    /// What joins each node to the next. Shapes: one fewer than there are nodes.
+    pub pieces: Vec<Piece>,
+    /// Signed half turns after which the end of a closed belt joins its start; `None` of an open belt.
+    pub half_turns: Option<i32>,
+    /// Arc length u of every node, not falling from 0 to U; repeated at a joint, before and after.
+    pub u: Vec<f64>,
+    /// Pose of every node.
+    pub pose: Vec<Pose>,
+    /// Bend ω_ζ at every node; linear in between.
+    pub bend: Vec<f64>,
+    /// Rib slope β = tan α at every node, Eq. (31); linear in between.
+    pub rib_slope: Vec<f64>,
+}
+
+/// The spine at one arc length.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SpinePoint {
+    /// Arc length.
+    pub u: f64,
+    /// Pose: frame and position.
+    pub pose: Pose,
+    /// Bend ω_ζ.
+    pub bend: f64,
+    /// Rib slope β.
+    pub rib_slope: f64,
+}
+
+impl Spine {
+    /// The open spine of given fields at the nodes, integrated from the pose at the first one.
+    ///
+    /// Shapes: `u`, `bend` and `rib_slope` of one length, `u` not falling, `pieces` one shorter.
+    ///
+    /// # Panics
+    ///
+    /// If the lengths differ.
+    pub fn from_fields(
+        width: f64,
+        start: Pose,
+        pieces: Vec<Piece>,
+        u: Vec<f64>,
+        bend: Vec<f64>,
+        rib_slope: Vec<f64>,
+    ) -> Self {
+        assert!(u.len() == bend.len() && u.len() == rib_slope.len());
+        assert_eq!(pieces.len() + 1, u.len());
+        let mut spine = Self {
+            width,
+            pieces,
+            half_turns: None,
+            pose: vec![start; u.len()],
+            u,
+            bend,
+            rib_slope,
+        };
+        for element in 0..spine.elements() {
+            spine.pose[element + 1] = spine.pose_within(element, spine.element_length(element));
+        }
+        spine
+    }
+
+    /// The same of a straight belt, whose fields may jump where a node is repeated.
+    ///
+    /// # Panics
+    ///
+    /// If the lengths differ.
+    pub fn straight(
+        width: f64,
+        start: Pose,
+        u: Vec<f64>,
+        bend: Vec<f64>,
+        rib_slope: Vec<f64>,
+    ) -> Self {
+        let piece = |pair: &[f64]| match pair[0] == pair[1] {
+            true => Piece::Joint { angle: 0.0 },
+            false => Piece::Strip { geodesic: 0.0 },
+        };
+        let pieces = u.windows(2).map(piece).collect();
+        Self::from_fields(width, start, pieces, u, bend, rib_slope)
+    }
+
+    /// Length U.
+    pub fn length(&self) -> f64 {
+        self.u.last().copied().unwrap_or(0.0) - self.u.first().copied().unwrap_or(0.0)
+    }
+
+    /// Torsion ω_η = −β ω_ζ at every node.
+    ///
+    /// Source: Eq. (32)
+    pub fn torsion(&self) -> Vec<f64> {
+        let fields = self.bend.iter().zip(&self.rib_slope);
+        fields.map(|(&bend, &slope)| torsion(bend, slope)).collect()
+    }
+
+    /// Total torsion ∫ ω_η du.
+    ///
+    /// Simpson's rule, exact for the product of two linear fields.
+    ///
+    /// Units: rad
+    pub fn twist(&self) -> f64 {
+        (0..self.elements())
+            .map(|element| self.element_twist(element))
+            .sum()
+    }
+
+    /// The spine at arc length u, held to [0, U]; before the jump where a node is repeated.
+    ///
+    /// # Panics
+    ///
+    /// If the spine has no nodes.
+    pub fn at(&self, u: f64) -> SpinePoint {
+        let next = self.u.partition_point(|&node| node < u);
+        if next == self.u.len() {
+            return self.node(next - 1);
+        }
+        if next == 0 || self.u[next] == u {
+            return self.node(next);
+        }
+        self.within(next - 1, u - self.u[next - 1])
+    }
+
+    /// The spine at a node.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such node.
+    pub fn node(&self, index: usize) -> SpinePoint {
+        SpinePoint {
+            u: self.u[index],
+            pose: self.pose[index],
+            bend: self.bend[index],
+            rib_slope: self.rib_slope[index],
+        }
+    }
+
+    /// The flexible elements: neither joints, which have no length, nor stiffeners, which have no ribs.
+    pub(crate) fn strips(&self) -> impl Iterator<Item = usize> {
+        (0..self.elements()).filter(|&element| {
+            matches!(self.pieces[element], Piece::Strip { .. })
+                && self.element_length(element) > 0.0
+        })
+    }
+
+    /// Rib convergence s inside an element, at a point of given rib slope.
+    pub(crate) fn convergence(&self, element: usize, rib_slope: f64) -> f64 {
+        let rise = self.rib_slope[element + 1] - self.rib_slope[element];
+        let rate = rise / self.element_length(element);
+        rib_convergence(rate, self.pieces[element].geodesic(), rib_slope)
+    }
+
+    /// Rib convergence s in the middle of an element.
+    pub(crate) fn mean_convergence(&self, element: usize) -> f64 {
+        let mean = 0.5 * (self.rib_slope[element] + self.rib_slope[element + 1]);
+        self.convergence(element, mean)
+    }
+
+    /// Number of elements.
+    pub(crate) fn elements(&self) -> usize {
+        self.u.len().saturating_sub(1)
+    }
+
+    /// Length of an element; 0 where a node is repeated.
+    pub(crate) fn element_length(&self, element: usize) -> f64 {
+        self.u[element + 1] - self.u[element]
+    }
+
+    /// The spine inside an element, a distance after its first node.
+    ///
+    /// The fields are taken at the two Gauss points of the part before, so that a full element repeats the
+    /// solver's own step.
+    pub(crate) fn within(&self, element: usize, distance: f64) -> SpinePoint {
+        let (bend, rib_slope) = self.fields(element, distance);
+        SpinePoint {
+            u: self.u[element] + distance,
+            pose: self.pose_within(element, distance),
+            bend,
+            rib_slope,
+        }
+    }
+
+    /// Bend and rib slope inside an element.
+    pub(crate) fn fields(&self, element: usize, distance: f64) -> (f64, f64) {
+        let fraction = distance / self.element_length(element);
+        let between = |field: &[f64]| match fraction.is_finite() {
+            true => field[element] + fraction * (field[element + 1] - field[element]),
+            false => field[element],
+        };
+        (between(&self.bend), between(&self.rib_slope))
+    }
+
+    fn pose_within(&self, element: usize, distance: f64) -> Pose {
+        let (bend, slope) = (self.bend[element], self.rib_slope[element]);
+        let (bend_there, slope_there) = self.fields(element, distance);
+        let fields = Vector4::new(bend, slope, bend_there, slope_there);
+        let piece = self.pieces[element];
+        self.pose[element]
+            * match piece {
+                Piece::Joint { angle } => turn(angle),
+                Piece::Strip { .. } | Piece::Rigid => {
+                    increment(distance, piece.geodesic(), &fields)
+                }
+            }
+    }
+
+    fn element_twist(&self, element: usize) -> f64 {
+        let length = self.element_length(element);
+        let at = |distance: f64| {
+            let (bend, rib_slope) = self.fields(element, distance);
+            torsion(bend, rib_slope)
+        };
+        length / 6.0 * (at(0.0) + 4.0 * at(0.5 * length) + at(length))
+    }
+}
+
+/// The turn of the frame about ξ at a bend of the board, Rot_ξ(χ).
+pub(crate) fn turn(angle: f64) -> Pose {
+    Pose {
+        frame: exp(&(angle * Vector3::x())),
+        position: Vector3::zeros(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::hat;
+    use crate::strip::element::strain;
+    use approx::assert_relative_eq;
+    use nalgebra::Vector3;
+
+    fn uniform(n: usize, bend: impl Fn(f64) -> f64, slope: impl Fn(f64) -> f64) -> Spine {
+        let u: Vec<f64> = (0..=n).map(|i| i as f64 / n as f64).collect();
+        let bend = u.iter().copied().map(bend).collect();
+        let slope = u.iter().copied().map(slope).collect();
+        Spine::straight(0.1, Pose::identity(), u, bend, slope)
+    }
+
+    #[test]
+    fn test_constant_bend_makes_a_circle() {
+        let spine = uniform(7, |_| 2.0, |_| 0.0);
+        for u in [0.0f64, 0.1, 0.5, 0.93, 1.0] {
+            let expected = Vector3::new((2.0 * u).cos() - 1.0, (2.0 * u).sin(), 0.0) / 2.0;
+            assert_relative_eq!(spine.at(u).pose.position, expected, epsilon = 1e-14);
+        }
+    }
+
+    #[test]
+    fn test_constant_fields_make_a_helix_on_a_cylinder() {
+        let (a, radius) = (0.4f64, 0.3);
+        let spine = uniform(5, |_| a.cos().powi(2) / radius, |_| a.tan());
+        let axis = Vector3::new(0.0, -a.sin(), a.cos());
+        for i in 0..50 {
+            let from_axis = spine.at(f64::from(i) / 49.0).pose.position + Vector3::x() * radius;
+            assert_relative_eq!(from_axis.cross(&axis).norm(), radius, epsilon = 1e-13);
+        }
+    }
+
+    #[test]
+    fn test_points_between_nodes_converge_with_order_four() {
+        let make = |n| uniform(n, |u| 3.0 - 5.0 * u, |u| 2.0 * u - 0.5);
+        let fine = make(512).at(0.77).pose;
+        let error = |n| (make(n).at(0.77).pose.position - fine.position).norm();
+        assert!(error(16) < 1e-5);
+        assert!((error(8) / error(32)).log2() > 7.0);
+    }
+
+    #[test]
+    fn test_frame_turns_by_the_rates_between_nodes() {
+        let spine = uniform(40, |u| 3.0 - 5.0 * u, |u| 2.0 * u - 0.5);
+        let (u, h) = (0.4321, 1e-5);
+        let (before, here, after) = (spine.at(u - h), spine.at(u), spine.at(u + h));
+        let rates = strain(0.0, here.bend, here.rib_slope).rotation;
+        let frame_rate = (after.pose.frame - before.pose.frame) / (2.0 * h);
+        assert!((frame_rate - here.pose.frame * hat(&rates)).norm() < 1e-4);
+        let tangent = (after.pose.position - before.pose.position) / (2.0 * h);
+        assert!((tangent - here.pose.frame.column(1)).norm() < 1e-4);
+    }
+
+    #[test]
+    fn test_end_of_an_element_is_its_second_node() {
+        let spine = uniform(9, |u| 3.0 - 5.0 * u, |u| 2.0 * u);
+        for element in 0..9 {
+            let end = spine.within(element, spine.element_length(element));
+            assert_relative_eq!(
+                end.pose.position,
+                spine.pose[element + 1].position,
+                epsilon = 1e-14
+            );
+        }
+    }
+
+    #[test]
+    fn test_arc_length_beyond_the_ends_is_held() {
+        let spine = uniform(3, |_| 1.0, |u| u);
+        assert_eq!(spine.at(-1.0), spine.node(0));
+        assert_eq!(spine.at(2.0), spine.node(3));
+    }
+
+    #[test]
+    fn test_at_a_repeated_node_the_one_before_counts() {
+        let u = vec![0.0, 0.5, 0.5, 1.0];
+        let spine = Spine::straight(
+            0.1,
+            Pose::identity(),
+            u,
+            vec![1.0, 1.0, 3.0, 3.0],
+            vec![0.0; 4],
+        );
+        assert_eq!(spine.at(0.5).bend, 1.0);
+        assert_eq!(spine.at(0.5 + 1e-9).bend, 3.0);
+        assert_eq!(spine.pose[1], spine.pose[2]);
+    }
+
+    #[test]
+    fn test_twist_is_exact_for_linear_fields() {
+        // −∫ (3 − 5u)(2u − 0.5) du over [0, 1]
+        let spine = uniform(3, |u| 3.0 - 5.0 * u, |u| 2.0 * u - 0.5);
+        assert_relative_eq!(
+            spine.twist(),
+            -(-1.5 + 8.5 / 2.0 - 10.0 / 3.0),
+            epsilon = 1e-14
+        );
+        assert_relative_eq!(spine.length(), 1.0);
+    }
+}

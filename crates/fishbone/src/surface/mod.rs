@@ -1,0 +1,23 @@
+//! The deformed surface: fundamental forms, curvatures, ribs, edges and meshes, Eq. (5)–(31).
+//!
+//! The rib through P(u) is the straight line `x(u) + v (ζ − β η)`; in the flat board it is the line `p(u) + v (n − β t)`,
+//! where p is the flat spine with its tangent t and its normal n. Both are known once a [`Rib`] is. The flat
+//! board is that of [`crate::board`].
+
+mod curvature;
+mod extremes;
+pub mod linking;
+mod locate;
+mod mesh;
+mod patch;
+mod rib;
+mod self_crossing;
+
+pub use curvature::*;
+pub use extremes::*;
+pub use mesh::*;
+pub use rib::*;
+pub use self_crossing::*;
+
+#[cfg(test)]
+mod tests;
