@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     from numpy.typing import NDArray
 
+    from fishbone.names import EnergyModel, Place, Status
     from fishbone.scenario import Scenario
 
     Floats = NDArray[np.float64]
@@ -30,8 +31,6 @@ MAX_MODES = 100
 
 MAX_REACH = 10.0
 """Farther than any support of a belt of length 1 needs to go."""
-
-Status = Literal["converged", "infeasible", "not_converged"]
 
 
 class Reaction(NamedTuple):
@@ -192,7 +191,7 @@ class Equilibrium:
         return self._inner.elastic_energy
 
     @property
-    def energy_model(self) -> str:
+    def energy_model(self) -> EnergyModel:
         """The energy minimised: "fishbone", "sadowsky" or "wunderlich"."""
         return self._inner.energy_model
 
@@ -393,7 +392,7 @@ class Equilibrium:
         """Signed half turns with which a closed belt ended; None of an open one."""
         return self._inner.half_turns
 
-    def reaction(self, support: Literal["start", "end"] | float) -> Reaction:
+    def reaction(self, support: Place) -> Reaction:
         """What a support does to the belt, by its index (int) or place ("start", "end", arc length as a float).
 
         Errors: `NoSupport`.
@@ -403,7 +402,7 @@ class Equilibrium:
 
     def snap_margin(
         self,
-        support: Literal["start", "end"] | float = "end",
+        support: Place = "end",
         direction: npt.ArrayLike | None = None,
         *,
         reach: float = 1.0,
@@ -445,7 +444,7 @@ class Equilibrium:
                 raise NoSensitivity(str(error)) from None
         return self._sensitivity
 
-    def jacobian(self, support: Literal["start", "end"] | float) -> Floats:
+    def jacobian(self, support: Place) -> Floats:
         """Derivatives of the spine's positions by the motion of a support, which is named as for `reaction`.
 
         The last axis is [translation, left world-axes rotation about the support point]; components that the support
@@ -457,7 +456,7 @@ class Equilibrium:
         """
         return self.sensitivity().jacobian(self._support_index(support))
 
-    def _support_index(self, support: Literal["start", "end"] | float) -> int:
+    def _support_index(self, support: Place) -> int:
         if isinstance(support, int | np.integer):
             count = len(self._inner.reactions)
             try:

@@ -6,13 +6,14 @@ import functools
 import math
 import re
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, get_args
 
 import numpy as np
 
 from fishbone import _core
 from fishbone.equilibrium import Equilibrium, Reaction, solve
 from fishbone.errors import InvalidArgument, NoBranch, NoPath
+from fishbone.names import Motion
 from fishbone.scenario import Scenario
 from fishbone.tracker import triple
 
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     from numpy.typing import NDArray
 
-    from fishbone.tracker import Place
+    from fishbone.names import End, Kind, Place
 
     Floats = NDArray[np.float64]
     Columns = dict[str, NDArray[Any]]
@@ -31,9 +32,6 @@ SCHEMA = "fishbone.diagram/1"
 MAX_STEP = 1.0
 MIN_STATES, MAX_STATES = 2, 100_000
 MAX_BRANCHES = 1000
-
-Kind = Literal["fold", "pitchfork", "transcritical", "bifurcation"]
-End = Literal["range", "event", "closed", "budget", "lost", "edges", "taut"]
 
 
 class Poses(NamedTuple):
@@ -46,7 +44,7 @@ class Poses(NamedTuple):
     """Each a position and a rotation vector, world axes, shapes (3,)."""
     support: Place = "end"
     """Which support, named as for `Equilibrium.reaction`; it must hold a position and a rotation."""
-    motion: Literal["straight", "screw"] = "straight"
+    motion: Motion = "straight"
     """From one pose to the next: the point on a straight line and the frame about a fixed axis, or both as a screw; by
     the shorter turn either way."""
 
@@ -365,8 +363,10 @@ def _numbers(field: str, value: Any) -> Iterator[tuple[str, float]]:  # noqa: AN
 
 def _led(start: Equilibrium, path: Poses) -> _Way:
     """The path of a support's poses."""
-    if path.motion not in {"straight", "screw"}:
-        raise InvalidArgument(f'motion: found {path.motion!r}, allowed "straight" or "screw"')
+    motions = get_args(Motion)
+    if path.motion not in motions:
+        allowed = " or ".join(f'"{motion}"' for motion in motions)
+        raise InvalidArgument(f"motion: found {path.motion!r}, allowed {allowed}")
     if not isinstance(path.poses, Iterable):
         raise InvalidArgument(f"poses: found {path.poses!r}, allowed pairs of a position and a rotation")
     poses = []
@@ -379,7 +379,7 @@ def _led(start: Equilibrium, path: Poses) -> _Way:
     # The source's method knows no reactions, and cannot be followed wherever the support is.
     support = _index_of(start, path.support) if start._inner.reactions else 0  # noqa: SLF001 - of this package
     try:
-        inner = _core.Path.poses(start.scenario._inner, support, poses, path.motion == "screw")  # noqa: SLF001
+        inner = _core.Path.poses(start.scenario._inner, support, poses, path.motion)  # noqa: SLF001 - of this package
     except ValueError as error:
         raise NoPath(str(error)) from None
     return _Way(inner, "place on the path", support)

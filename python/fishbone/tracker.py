@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from fishbone.equilibrium import Equilibrium, Reaction, Status, solve
+from fishbone.equilibrium import Equilibrium, Reaction, solve
 from fishbone.errors import InvalidArgument, NoTracker
 from fishbone.scenario import Scenario
 
@@ -15,8 +15,9 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     from numpy.typing import NDArray
 
+    from fishbone.names import Place, Status
+
     Floats = NDArray[np.float64]
-    Place = Literal["start", "end"] | float
 
 
 class Update(NamedTuple):

@@ -4,7 +4,8 @@ use crate::array::{self, Grid, Points, Scalars, Triangles};
 use crate::scenario::Scenario;
 use crate::sensitivity::{Sensitivity, refused};
 use crate::tracker::Tracker;
-use fishbone::equilibrium::{self, Status, Wrench};
+use fishbone::equilibrium::{self, Wrench};
+use fishbone::names::Named;
 use fishbone::spine::Piece;
 use fishbone::surface::{self, Curve, Rib};
 use nalgebra::{Vector2, Vector3, Vector6};
@@ -50,15 +51,6 @@ pub(crate) fn solve_from(
     match signals.raised {
         Some(error) => Err(error),
         None => Ok(found),
-    }
-}
-
-/// The name of a status in results.
-pub(crate) fn status_name(status: Status) -> &'static str {
-    match status {
-        Status::Converged => "converged",
-        Status::Infeasible => "infeasible",
-        Status::NotConverged => "not_converged",
     }
 }
 
@@ -147,7 +139,7 @@ pub(crate) struct Equilibrium {
 impl Equilibrium {
     #[getter]
     fn status(&self) -> &'static str {
-        status_name(self.solved.status)
+        self.solved.status.name()
     }
 
     #[getter]

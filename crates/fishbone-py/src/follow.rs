@@ -3,7 +3,8 @@
 use crate::array::{self, Grid, Points, Scalars};
 use crate::equilibrium::{Equilibrium, Signals};
 use crate::scenario::Scenario;
-use fishbone::follow::{self as core, End, Settings, Summary};
+use fishbone::follow::{self as core, Settings, Summary};
+use fishbone::names::Named;
 use fishbone::path::{self, Motion};
 use nalgebra::Vector3;
 use numpy::IntoPyArray;
@@ -26,7 +27,7 @@ impl Path {
             .map_err(refused)
     }
 
-    /// A support that moves through poses, each a position and a rotation vector, as a screw or straight.
+    /// A support that moves through poses, each a position and a rotation vector, from one to the next by a motion's name.
     ///
     /// Errors: `ValueError`, one line.
     #[staticmethod]
@@ -34,18 +35,15 @@ impl Path {
         scenario: &Scenario,
         support: usize,
         poses: Vec<([f64; 3], [f64; 3])>,
-        screw: bool,
+        motion: &str,
     ) -> PyResult<Self> {
         let poses: Vec<_> = poses
             .into_iter()
             .map(|(position, rotation)| (Vector3::from(position), Vector3::from(rotation)))
             .collect();
-        let motion = if screw {
-            Motion::Screw
-        } else {
-            Motion::Straight
-        };
-        path::Path::poses(&scenario.0, support, &poses, motion)
+        let motion = Motion::ALL.iter().find(|known| known.name() == motion);
+        let motion = motion.ok_or_else(|| PyValueError::new_err("no name of a motion"))?;
+        path::Path::poses(&scenario.0, support, &poses, *motion)
             .map(Self)
             .map_err(refused)
     }
@@ -139,16 +137,7 @@ impl Diagram {
 
     /// Why a branch ends.
     fn end(&self, branch: usize) -> &'static str {
-        match self.0.branches[branch].end {
-            End::Range => "range",
-            End::Event => "event",
-            End::Closed => "closed",
-            End::Budget => "budget",
-            End::Lost => "lost",
-            End::Edges => "edges",
-            End::Taut => "taut",
-            End::Interrupted => "interrupted",
-        }
+        self.0.branches[branch].end.name()
     }
 
     /// Negative modes of every state of a branch.

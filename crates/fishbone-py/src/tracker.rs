@@ -1,8 +1,9 @@
 //! `_core.Tracker`.
 
 use crate::array::{self, Grid, Points, Scalars};
-use crate::equilibrium::{Equilibrium, Signals, status_name};
+use crate::equilibrium::{Equilibrium, Signals};
 use crate::scenario::Scenario;
+use fishbone::names::Named;
 use fishbone::tracker::{self, NoTracker};
 use nalgebra::Vector3;
 use numpy::IntoPyArray;
@@ -52,7 +53,7 @@ impl Tracker {
         match signals.raised {
             Some(error) => Err(error),
             None => Ok((
-                status_name(update.status),
+                update.status.name(),
                 update.snapped,
                 update.energy,
                 update.iterations,

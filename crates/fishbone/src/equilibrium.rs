@@ -9,6 +9,7 @@ mod search;
 use crate::belt::Belt;
 use crate::guess::{guess, waved};
 use crate::lie::Pose;
+use crate::names::named;
 use crate::program::{BeltPoint, BeltProgram, Piece};
 use crate::scenario::{BeltSpec, LinkSpec, Method, SAME_PLACE, Scenario, SupportSpec};
 use crate::solver::{self, Inertia, Residuals, Solution, Stationary};
@@ -19,16 +20,17 @@ use nalgebra::{Vector2, Vector3};
 use serde::Serialize;
 use std::ops::ControlFlow;
 
-/// How a solve ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Status {
-    /// All residuals are within the tolerance.
-    Converged,
-    /// No shape of the belt can meet the supports.
-    Infeasible,
-    /// The search ended without meeting the tolerance.
-    NotConverged,
+named! {
+    /// How a solve ended.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+    pub enum Status {
+        /// All residuals are within the tolerance.
+        Converged = "converged",
+        /// No shape of the belt can meet the supports.
+        Infeasible = "infeasible",
+        /// The search ended without meeting the tolerance.
+        NotConverged = "not_converged",
+    }
 }
 
 /// A force and a moment about the point where they act, world axes.

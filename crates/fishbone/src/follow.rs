@@ -3,6 +3,7 @@
 use crate::equilibrium::{
     Equilibrium, Mesh, Status, Wrench, excess_distance, is_settled, of_solution,
 };
+use crate::names::named;
 use crate::path::Path;
 use crate::program::{BeltPoint, BeltProgram};
 use crate::scenario::Scenario;
@@ -13,6 +14,7 @@ use crate::stability::Stability;
 use crate::surface;
 use crate::twins::{SAME, are_twins};
 use nalgebra::Vector3;
+use serde::Serialize;
 use std::ops::ControlFlow;
 use thiserror::Error;
 
@@ -34,6 +36,12 @@ pub enum NoBranch {
     )]
     Singular,
 }
+
+named!(impl NoBranch {
+    NoMultipliers = "no_multipliers",
+    NotConverged = "not_converged",
+    Singular = "singular",
+});
 
 /// How far to look. Lengths along a branch count the parameter of the path, from 0 to its length, and the motion of the belt
 /// in U alike.
@@ -125,30 +133,32 @@ pub struct Summary {
     pub residuals: Residuals,
 }
 
-/// What happens at an event.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
-    /// The branch turns back.
-    Fold,
-    /// Another branch crosses that is its own mirror image, or touches it to first order.
-    Pitchfork,
-    /// Another branch crosses at an angle.
-    Transcritical,
-    /// Other branches cross that could not be followed.
-    Bifurcation,
-}
-
-impl Kind {
-    /// Its name in results.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Fold => "fold",
-            Self::Pitchfork => "pitchfork",
-            Self::Transcritical => "transcritical",
-            Self::Bifurcation => "bifurcation",
-        }
+named! {
+    /// What happens at an event.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+    pub enum Kind {
+        /// The branch turns back.
+        Fold = "fold",
+        /// Another branch crosses that is its own mirror image, or touches it to first order.
+        Pitchfork = "pitchfork",
+        /// Another branch crosses at an angle.
+        Transcritical = "transcritical",
+        /// Other branches cross that could not be followed.
+        Bifurcation = "bifurcation",
     }
 }
+
+// The solver writes no files and knows no names.
+named!(impl End {
+    Range = "range",
+    Event = "event",
+    Closed = "closed",
+    Budget = "budget",
+    Lost = "lost",
+    Edges = "edges",
+    Taut = "taut",
+    Interrupted = "interrupted",
+});
 
 /// A place on a branch where the number of negative modes changes.
 #[derive(Debug, Clone)]

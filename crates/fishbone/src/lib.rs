@@ -39,6 +39,7 @@ pub mod lie;
 pub mod linking;
 pub mod margin;
 pub mod material;
+pub mod names;
 pub mod path;
 pub mod program;
 pub mod result;

@@ -3,6 +3,7 @@
 use crate::equilibrium::{Equilibrium, Mesh, Status, is_settled};
 use crate::follow::{NoBranch, is_taut_beyond};
 use crate::lie::{Pose, exp, log};
+use crate::names::named;
 use crate::path::{Motion, Path};
 use crate::program::{BeltPoint, BeltProgram};
 use crate::solver::{Continuation, End, Events, Family, Pace, Station, Turn};
@@ -46,6 +47,13 @@ pub enum NoMargin {
     )]
     Lost(f64),
 }
+
+named!(impl NoMargin {
+    NotStable = "not_stable",
+    NotClamped = "not_clamped",
+    Lost = "lost",
+    ..NoBranch,
+});
 
 /// The boundary of stability, as it is met along a direction.
 struct Boundary {

@@ -1,8 +1,11 @@
 //! Ways through the space of scenarios: one number or several that change together, or a support that moves.
 
+use crate::error::ScenarioError;
 use crate::lie::{Pose, Twist, exp, log};
+use crate::names::named;
 use crate::scenario::{Component, Scenario};
 use nalgebra::Vector3;
+use serde::Serialize;
 use serde_json::Value;
 use thiserror::Error;
 
@@ -34,14 +37,16 @@ struct Number {
     to: f64,
 }
 
-/// How a support moves from one pose to the next.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Motion {
-    /// Its point on a straight line, its frame about a fixed axis, both at a steady rate.
-    #[default]
-    Straight,
-    /// As a screw turns: about a fixed axis and along it, both at a steady rate.
-    Screw,
+named! {
+    /// How a support moves from one pose to the next.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+    pub enum Motion {
+        /// Its point on a straight line, its frame about a fixed axis, both at a steady rate.
+        #[default]
+        Straight = "straight",
+        /// As a screw turns: about a fixed axis and along it, both at a steady rate.
+        Screw = "screw",
+    }
 }
 
 /// Why there is no such path.
@@ -66,10 +71,21 @@ pub enum NoPath {
         "supports[{0}]: found a support that does not hold a position and a rotation, allowed one that does"
     )]
     NotClamped(usize),
-    /// The scenario at its end is none.
+    /// The scenario at its end is not valid.
     #[error("at the end of the path, {0}")]
-    Invalid(String),
+    Invalid(ScenarioError),
+    /// The scenario at its end cannot be read: a number is not of the kind that its field takes.
+    #[error("at the end of the path, {0}")]
+    Unreadable(String),
 }
+
+named!(impl NoPath {
+    NoNumber = "no_number",
+    Nothing = "nothing",
+    NotClamped = "not_clamped",
+    Invalid = "invalid",
+    Unreadable = "unreadable",
+});
 
 /// A value that is no number, by its kind where it is long.
 fn told(value: &Value) -> String {
@@ -182,7 +198,7 @@ impl Path {
         self.scenario(place).ok()
     }
 
-    fn scenario(&self, place: f64) -> Result<Scenario, String> {
+    fn scenario(&self, place: f64) -> Result<Scenario, NoPath> {
         match &self.change {
             Change::Numbers { base, numbers } => {
                 let mut tables = base.clone();
@@ -191,9 +207,9 @@ impl Path {
                         *value = number.at(place).into();
                     }
                 }
-                let scenario: Scenario =
-                    serde_json::from_value(tables).map_err(|error| error.to_string())?;
-                scenario.validate().map_err(|error| error.to_string())?;
+                let scenario: Scenario = serde_json::from_value(tables)
+                    .map_err(|error| NoPath::Unreadable(error.to_string()))?;
+                scenario.validate().map_err(NoPath::Invalid)?;
                 Ok(scenario)
             }
             Change::Poses {
@@ -209,7 +225,7 @@ impl Path {
     }
 
     fn checked(self) -> Result<Self, NoPath> {
-        self.scenario(self.length()).map_err(NoPath::Invalid)?;
+        self.scenario(self.length())?;
         Ok(self)
     }
 }

@@ -10,6 +10,7 @@ mod scales;
 mod system;
 
 use crate::equilibrium::{Equilibrium, Status, Wrench};
+use crate::names::named;
 use crate::solver::{Kkt, KktVector, Singular};
 use nalgebra::{Matrix3x6, Vector3};
 use scales::Scales;
@@ -91,6 +92,16 @@ pub enum NoSensitivity {
     #[error("the belt between its supports has no slack: they cannot move each by itself")]
     Taut,
 }
+
+named!(impl NoSensitivity {
+    NoMultipliers = "no_multipliers",
+    NotConverged = "not_converged",
+    Marginal = "marginal",
+    Flat = "flat",
+    Saddle = "saddle",
+    HeldTwice = "held_twice",
+    Taut = "taut",
+});
 
 /// The factorised first-order conditions of an equilibrium.
 #[derive(Debug)]

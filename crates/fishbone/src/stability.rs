@@ -1,6 +1,7 @@
 //! The second variation of the energy at an equilibrium: whether it is a minimum, and along which motions least so.
 
 use crate::equilibrium::{Equilibrium, Status};
+use crate::names::named;
 use crate::sensitivity::Motion;
 use crate::solver::{self, Singular};
 use thiserror::Error;
@@ -48,6 +49,12 @@ pub enum NoModes {
     #[error("the second variation could not be factorised")]
     Singular,
 }
+
+named!(impl NoModes {
+    NoMultipliers = "no_multipliers",
+    NotConverged = "not_converged",
+    Singular = "singular",
+});
 
 impl Stability {
     /// Whether the equilibrium is a local minimum; `None` where a way of no second variation leaves that open.

@@ -2,6 +2,7 @@
 
 use crate::equilibrium::{Equilibrium, Status, Units, Wrench, is_settled, of_solution, solve_near};
 use crate::lie::{Pose, exp};
+use crate::names::named;
 use crate::path::with_pose;
 use crate::program::{BeltPoint, BeltProgram, Piece};
 use crate::scenario::Scenario;
@@ -32,6 +33,14 @@ pub enum NoTracker {
     #[error("the equilibrium is no strict minimum of the energy: there is no one branch to follow")]
     Marginal,
 }
+
+named!(impl NoTracker {
+    NoMultipliers = "no_multipliers",
+    NotConverged = "not_converged",
+    NotClamped = "not_clamped",
+    NoSupport = "no_support",
+    Marginal = "marginal",
+});
 
 /// What became of a belt as its support moved.
 #[derive(Debug, Clone, PartialEq)]
