@@ -1,7 +1,7 @@
 """What things are called: in Python as in the core, and so in files."""
 
 import json
-from typing import Literal, get_args, get_origin
+from typing import Literal, get_args, get_origin, get_type_hints
 
 import pytest
 
@@ -35,6 +35,11 @@ def test_every_list_of_the_core_has_its_type():
 @pytest.mark.parametrize("list_", WORDS)
 def test_words_are_those_of_the_core(list_):
     assert [*get_args(getattr(names, list_)), *NEVER_SEEN] == [*NAMES[list_], *NEVER_SEEN - set(NAMES[list_])]
+
+
+@pytest.mark.parametrize("list_", REASONS)
+def test_reasons_are_those_of_the_core(list_):
+    assert literals(get_type_hints(getattr(fb, list_))["reason"]) == set(NAMES[list_])
 
 
 @pytest.mark.parametrize("list_", ["EnergyModel", "Method", "Axis"])

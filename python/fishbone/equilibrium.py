@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from fishbone import _core
-from fishbone.errors import InvalidArgument, InvalidScenario, NoMargin, NoModes, NoSensitivity, NoSupport, NotConverged
+from fishbone.errors import InvalidArgument, InvalidScenario, NoSupport, NotConverged
 from fishbone.sensitivity import Sensitivity
 
 if TYPE_CHECKING:
@@ -240,10 +240,7 @@ class Equilibrium:
         """
         if not 1 <= count <= MAX_MODES:
             raise InvalidArgument(f"count: found {count}, allowed 1 to {MAX_MODES}")
-        try:
-            return [Mode(*mode) for mode in self._inner.modes(count)]
-        except ValueError as error:
-            raise NoModes(str(error)) from None
+        return [Mode(*mode) for mode in self._inner.modes(count)]
 
     @property
     def iterations(self) -> int:
@@ -423,10 +420,7 @@ class Equilibrium:
         if not (np.ndim(reach) == 0 and 0.0 < reach <= MAX_REACH):
             raise InvalidArgument(f"reach: found {reach!r}, allowed above 0 and up to {MAX_REACH:g}, in U and rad")
         along = None if direction is None else _direction(direction)
-        try:
-            margin = self._inner.margin(self._support_index(support), along, reach)
-        except ValueError as error:
-            raise NoMargin(str(error)) from None
+        margin = self._inner.margin(self._support_index(support), along, reach)
         if margin is None:
             return None
         distance, towards, is_fold, position, rotation = margin
@@ -438,10 +432,7 @@ class Equilibrium:
         Errors: `NoSensitivity` unless the equilibrium has converged to a minimum that its supports determine.
         """
         if self._sensitivity is None:
-            try:
-                self._sensitivity = Sensitivity(self._inner.sensitivity())
-            except ValueError as error:
-                raise NoSensitivity(str(error)) from None
+            self._sensitivity = Sensitivity(self._inner.sensitivity())
         return self._sensitivity
 
     def jacobian(self, support: Place) -> Floats:
@@ -462,16 +453,14 @@ class Equilibrium:
             try:
                 return range(count)[int(support)]
             except IndexError:
-                raise NoSupport(f"support {support!r}: found {count} supports") from None
+                raise _no_support(support, f"found {count} supports") from None
         length = float(self.u[-1])
         place = {"start": 0.0, "end": length}.get(support) if isinstance(support, str) else float(support)
         places = [at for at, _, _ in self._inner.reactions]
         for index, at in enumerate(places):
             if place is not None and math.isclose(at, place, abs_tol=1e-9 * length):
                 return index
-        raise NoSupport(
-            f'support {support!r}: found supports at u = {places}, allowed one of them, "start", "end" or an index'
-        )
+        raise _no_support(support, f'found supports at u = {places}, allowed one of them, "start", "end" or an index')
 
     def surface(self, n_across: int = 9) -> Floats:
         """Points of the surface, on every rib from the −ζ edge to the +ζ edge.
@@ -568,10 +557,11 @@ def solve(
     `scenario` is none or `start` no shape.
     """
     core = core_of(scenario)
-    inner = _core.solve(core) if start is None else _core.solve_from(core, *_shape(start))
+    shape = None if start is None else _shape(start)
+    inner = _core.solve(core) if shape is None else _core.solve_from(core, *shape)
     equilibrium = Equilibrium(scenario, inner)
     if strict and equilibrium.status != "converged":
-        raise NotConverged(equilibrium)
+        raise NotConverged(equilibrium, shape)
     return equilibrium
 
 
@@ -612,6 +602,12 @@ def core_of(scenario: Scenario) -> _core.Scenario:
     if not isinstance(inner, _core.Scenario):
         raise InvalidArgument(f"scenario: found {type(scenario).__name__}, allowed a Scenario, as fishbone.load gives")
     return inner
+
+
+def _no_support(support: Place, found: str) -> NoSupport:
+    error = NoSupport(f"support {support!r}: {found}")
+    error.support = support
+    return error
 
 
 def _across(n_across: int) -> int:

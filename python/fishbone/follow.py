@@ -12,7 +12,7 @@ import numpy as np
 
 from fishbone import _core
 from fishbone.equilibrium import Equilibrium, Reaction, solve
-from fishbone.errors import InvalidArgument, NoBranch, NoPath
+from fishbone.errors import InvalidArgument
 from fishbone.names import Motion
 from fishbone.scenario import Scenario
 from fishbone.tracker import triple
@@ -308,13 +308,7 @@ def follow(  # noqa: PLR0913 - keywords all but two
         # What is no path is refused before a long solve.
         way = _changed(scenario if isinstance(scenario, Scenario) else scenario.scenario, path)
         start = _solved(scenario)
-    try:
-        inner = _core.follow(start._inner, way.inner, float(step), int(states), int(branches), progress)  # noqa: SLF001
-    except ValueError as error:
-        # What `progress` or a signal's handler has raised comes from deeper down.
-        if error.__traceback__ is not None and error.__traceback__.tb_next is not None:
-            raise
-        raise NoBranch(str(error)) from None
+    inner = _core.follow(start._inner, way.inner, float(step), int(states), int(branches), progress)  # noqa: SLF001
     return Diagram(inner, start, way.parameter_name, way.support)
 
 
@@ -338,10 +332,7 @@ def _changed(scenario: Scenario, path: Mapping[str, Any]) -> _Way:
     for field in fields:
         if fields.count(field) > 1:
             raise InvalidArgument(f"{field}: found twice in the path, allowed once")
-    try:
-        inner = _core.Path.numbers(scenario._inner, numbers)  # noqa: SLF001 - of this package
-    except ValueError as error:
-        raise NoPath(str(error)) from None
+    inner = _core.Path.numbers(scenario._inner, numbers)  # noqa: SLF001 - of this package
     moved = (re.match(r"supports\[(\d+)\]", field) for field in fields)
     support = next((int(found[1]) for found in moved if found is not None), None)
     return _Way(inner, fields[0] if len(fields) == 1 else "share of the path", support)
@@ -378,10 +369,7 @@ def _led(start: Equilibrium, path: Poses) -> _Way:
         poses.append((triple(f"poses[{index}][0]", position), triple(f"poses[{index}][1]", rotation)))
     # The source's method knows no reactions, and cannot be followed wherever the support is.
     support = _index_of(start, path.support) if start._inner.reactions else 0  # noqa: SLF001 - of this package
-    try:
-        inner = _core.Path.poses(start.scenario._inner, support, poses, path.motion)  # noqa: SLF001 - of this package
-    except ValueError as error:
-        raise NoPath(str(error)) from None
+    inner = _core.Path.poses(start.scenario._inner, support, poses, path.motion)  # noqa: SLF001 - of this package
     return _Way(inner, "place on the path", support)
 
 

@@ -1,8 +1,9 @@
 //! `_core.Equilibrium` and the solve that makes it.
 
 use crate::array::{self, Grid, Points, Scalars, Triangles};
+use crate::errors::raised;
 use crate::scenario::Scenario;
-use crate::sensitivity::{Sensitivity, refused};
+use crate::sensitivity::Sensitivity;
 use crate::tracker::Tracker;
 use fishbone::equilibrium::{self, Wrench};
 use fishbone::names::Named;
@@ -10,7 +11,6 @@ use fishbone::spine::Piece;
 use fishbone::surface::{self, Curve, Rib};
 use nalgebra::{Vector2, Vector3, Vector6};
 use numpy::IntoPyArray;
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
@@ -458,7 +458,7 @@ impl Equilibrium {
     /// (distance, direction, whether it is a fold, position, rotation vector) of the nearest loss of stability, along a
     /// direction or wherever it is; None where there is none within reach.
     ///
-    /// Errors: `ValueError`, one line, where there is no stability to lose; whatever a signal handler raises.
+    /// Errors: `NoMargin`; whatever a signal handler raises.
     #[pyo3(signature = (support, direction, reach))]
     fn margin(
         &self,
@@ -482,7 +482,7 @@ impl Equilibrium {
         if let Some(error) = signals.raised {
             return Err(error);
         }
-        let margin = margin.map_err(|error| PyValueError::new_err(error.to_string()))?;
+        let margin = margin.map_err(|error| raised(py, &error))?;
         Ok(margin.map(|margin| {
             (
                 margin.distance,
@@ -497,10 +497,10 @@ impl Equilibrium {
     /// (eigenvalue, translation, rotation, bend, rib slope) of the lowest modes, found with the GIL released.
     ///
     /// Shapes: (n, 3), (n, 3), (n,), (n,).
-    /// Errors: `ValueError`, one line, where it has none.
+    /// Errors: `NoModes`.
     fn modes<'py>(&self, py: Python<'py>, count: usize) -> PyResult<Vec<Mode<'py>>> {
         let modes = py.detach(|| self.solved.modes(count));
-        let modes = modes.map_err(|error| PyValueError::new_err(error.to_string()))?;
+        let modes = modes.map_err(|error| raised(py, &error))?;
         let mode = |mode: fishbone::stability::Mode| {
             (
                 mode.eigenvalue,
@@ -515,17 +515,19 @@ impl Equilibrium {
 
     /// Follows it while a support moves.
     ///
-    /// Errors: `ValueError`, one line, where there is nothing to follow.
-    fn tracker(&self, support: usize) -> PyResult<Tracker> {
-        Tracker::new(&self.solved, support)
+    /// Errors: `NoTracker`.
+    fn tracker(&self, py: Python<'_>, support: usize) -> PyResult<Tracker> {
+        Tracker::new(py, &self.solved, support)
     }
 
     /// Its first-order conditions, factorised with the GIL released.
     ///
-    /// Errors: `ValueError`, one line, where it has no derivatives.
+    /// Errors: `NoSensitivity`.
     fn sensitivity(&self, py: Python<'_>) -> PyResult<Sensitivity> {
         let sensitivity = py.detach(|| self.solved.sensitivity());
-        sensitivity.map(Sensitivity::new).map_err(refused)
+        sensitivity
+            .map(Sensitivity::new)
+            .map_err(|error| raised(py, &error))
     }
 
     /// The result schema as JSON, without `solve_time`.

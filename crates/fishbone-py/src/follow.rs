@@ -2,6 +2,7 @@
 
 use crate::array::{self, Grid, Points, Scalars};
 use crate::equilibrium::{Equilibrium, Signals};
+use crate::errors::raised;
 use crate::scenario::Scenario;
 use fishbone::follow::{self as core, Settings, Summary};
 use fishbone::names::Named;
@@ -19,19 +20,20 @@ pub(crate) struct Path(path::Path);
 impl Path {
     /// Numbers of a scenario that change together, each a field and its last value.
     ///
-    /// Errors: `ValueError`, one line.
+    /// Errors: `NoPath`.
     #[staticmethod]
-    fn numbers(scenario: &Scenario, changes: Vec<(String, f64)>) -> PyResult<Self> {
+    fn numbers(py: Python<'_>, scenario: &Scenario, changes: Vec<(String, f64)>) -> PyResult<Self> {
         path::Path::numbers(&scenario.0, &changes)
             .map(Self)
-            .map_err(refused)
+            .map_err(|error| raised(py, &error))
     }
 
     /// A support that moves through poses, each a position and a rotation vector, from one to the next by a motion's name.
     ///
-    /// Errors: `ValueError`, one line.
+    /// Errors: `NoPath`; `ValueError` where no motion has that name.
     #[staticmethod]
     fn poses(
+        py: Python<'_>,
         scenario: &Scenario,
         support: usize,
         poses: Vec<([f64; 3], [f64; 3])>,
@@ -45,13 +47,13 @@ impl Path {
         let motion = motion.ok_or_else(|| PyValueError::new_err("no name of a motion"))?;
         path::Path::poses(&scenario.0, support, &poses, *motion)
             .map(Self)
-            .map_err(refused)
+            .map_err(|error| raised(py, &error))
     }
 }
 
 /// Follows an equilibrium along a path with the GIL released; `progress(branch, share of the path)` is called now and then.
 ///
-/// Errors: `ValueError`, one line, where there is nothing to follow; whatever `progress` or a signal handler raises.
+/// Errors: `NoBranch`; whatever `progress` or a signal handler raises.
 #[pyfunction]
 #[pyo3(signature = (equilibrium, path, step, states, branches, progress=None))]
 pub(crate) fn follow(
@@ -81,12 +83,8 @@ pub(crate) fn follow(
     });
     match signals.raised {
         Some(error) => Err(error),
-        None => found.map(Diagram).map_err(refused),
+        None => found.map(Diagram).map_err(|error| raised(py, &error)),
     }
-}
-
-fn refused(error: impl std::error::Error) -> PyErr {
-    PyValueError::new_err(error.to_string())
 }
 
 /// The branches of equilibria along a path.

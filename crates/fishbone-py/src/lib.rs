@@ -4,6 +4,7 @@ mod array;
 mod batch;
 mod branches;
 mod equilibrium;
+mod errors;
 mod follow;
 mod names;
 mod scenario;

@@ -2,12 +2,12 @@
 
 use crate::array::{self, Grid, Points, Scalars};
 use crate::equilibrium::{Equilibrium, Signals};
+use crate::errors::raised;
 use crate::scenario::Scenario;
 use fishbone::names::Named;
-use fishbone::tracker::{self, NoTracker};
+use fishbone::tracker;
 use nalgebra::Vector3;
 use numpy::IntoPyArray;
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -16,15 +16,15 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 pub(crate) struct Tracker(Mutex<tracker::Tracker>);
 
 impl Tracker {
-    /// Errors: `ValueError`, one line, where there is nothing to follow.
+    /// Errors: `NoTracker`.
     pub(crate) fn new(
+        py: Python<'_>,
         equilibrium: &fishbone::equilibrium::Equilibrium,
         support: usize,
     ) -> PyResult<Self> {
-        let refused = |error: NoTracker| PyValueError::new_err(error.to_string());
         tracker::Tracker::new(equilibrium, support)
             .map(|tracker| Self(Mutex::new(tracker)))
-            .map_err(refused)
+            .map_err(|error| raised(py, &error))
     }
 
     fn lock(&self) -> MutexGuard<'_, tracker::Tracker> {
