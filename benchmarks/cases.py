@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import json
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, get_args
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
@@ -12,6 +12,7 @@ from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
 import fishbone as fb
+from fishbone.names import EnergyModel
 from tables import ROOT
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-ENERGIES = ("fishbone", "sadowsky", "wunderlich")
+ENERGIES = get_args(EnergyModel)
 EXAMPLES = ("example1", "example2")
 SHELLS = ROOT / "tests" / "data" / "shell"
 SHAPES = ROOT / "docs" / "shapes.toml"

@@ -9,14 +9,15 @@ uniform in 0–70°, V = 0.1 U, the three energies in turn. No pose is discarded
 from __future__ import annotations
 
 import argparse
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
 import fishbone as fb
 import tables
+from fishbone.names import EnergyModel
 
-ENERGIES = ("fishbone", "sadowsky", "wunderlich")
+ENERGIES = get_args(EnergyModel)
 TOLERANCE = 1e-8
 
 

@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, Protocol, cast
+from typing import TYPE_CHECKING, Protocol, TypeAlias, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import fishbone as fb
+from fishbone.names import EnergyModel
 from tables import ROOT
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
 Floats = NDArray[np.float64]
-Energy = Literal["fishbone", "sadowsky", "wunderlich"]
+Energy: TypeAlias = EnergyModel
 
 EXAMPLES = ("example1", "example2")
-ENERGIES: tuple[Energy, ...] = ("fishbone", "sadowsky", "wunderlich")
+ENERGIES: tuple[Energy, ...] = get_args(EnergyModel)
 LENGTH, WIDTH = 1.0, 0.1
 TOLERANCE = 1e-8
 WAVES = 3

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from fishbone.equilibrium import Equilibrium
-    from fishbone.follow import Branch, Diagram, Kind
-    from fishbone.tracker import Place
+    from fishbone.follow import Branch, Diagram
+    from fishbone.names import Kind, Place
 
     Floats = NDArray[np.float64]
     Style = dict[str, Any]

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from fishbone.equilibrium import Equilibrium
     from fishbone.follow import Columns, Diagram
-    from fishbone.tracker import Place
+    from fishbone.names import Motion, Place
 
 
 class Failure(click.ClickException):
@@ -311,7 +311,7 @@ def _path_of(
         found = "--to and --pose" if numbers else "neither --to nor --pose"
         raise Invalid(f"path: found {found}, allowed one of them")
     if poses:
-        motion: Any = "screw" if screw else "straight"
+        motion: Motion = "screw" if screw else "straight"
         return fishbone.Poses([_pose(pose) for pose in poses], _place(support or "end"), motion)
     if screw or support is not None:
         raise Invalid("path: found --support or --screw with --to, allowed with --pose")

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import math
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from fishbone import _core
-from fishbone.errors import InvalidArgument, InvalidScenario, NoMargin, NoModes, NoSensitivity, NoSupport, NotConverged
+from fishbone.errors import InvalidArgument, InvalidScenario, NoSupport, NotConverged
 from fishbone.sensitivity import Sensitivity
 
 if TYPE_CHECKING:
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     from numpy.typing import NDArray
 
+    from fishbone.names import EnergyModel, Place, Status
     from fishbone.scenario import Scenario
 
     Floats = NDArray[np.float64]
@@ -30,8 +31,6 @@ MAX_MODES = 100
 
 MAX_REACH = 10.0
 """Farther than any support of a belt of length 1 needs to go."""
-
-Status = Literal["converged", "infeasible", "not_converged"]
 
 
 class Reaction(NamedTuple):
@@ -192,7 +191,7 @@ class Equilibrium:
         return self._inner.elastic_energy
 
     @property
-    def energy_model(self) -> str:
+    def energy_model(self) -> EnergyModel:
         """The energy minimised: "fishbone", "sadowsky" or "wunderlich"."""
         return self._inner.energy_model
 
@@ -241,10 +240,7 @@ class Equilibrium:
         """
         if not 1 <= count <= MAX_MODES:
             raise InvalidArgument(f"count: found {count}, allowed 1 to {MAX_MODES}")
-        try:
-            return [Mode(*mode) for mode in self._inner.modes(count)]
-        except ValueError as error:
-            raise NoModes(str(error)) from None
+        return [Mode(*mode) for mode in self._inner.modes(count)]
 
     @property
     def iterations(self) -> int:
@@ -393,7 +389,7 @@ class Equilibrium:
         """Signed half turns with which a closed belt ended; None of an open one."""
         return self._inner.half_turns
 
-    def reaction(self, support: Literal["start", "end"] | float) -> Reaction:
+    def reaction(self, support: Place) -> Reaction:
         """What a support does to the belt, by its index (int) or place ("start", "end", arc length as a float).
 
         Errors: `NoSupport`.
@@ -403,7 +399,7 @@ class Equilibrium:
 
     def snap_margin(
         self,
-        support: Literal["start", "end"] | float = "end",
+        support: Place = "end",
         direction: npt.ArrayLike | None = None,
         *,
         reach: float = 1.0,
@@ -424,10 +420,7 @@ class Equilibrium:
         if not (np.ndim(reach) == 0 and 0.0 < reach <= MAX_REACH):
             raise InvalidArgument(f"reach: found {reach!r}, allowed above 0 and up to {MAX_REACH:g}, in U and rad")
         along = None if direction is None else _direction(direction)
-        try:
-            margin = self._inner.margin(self._support_index(support), along, reach)
-        except ValueError as error:
-            raise NoMargin(str(error)) from None
+        margin = self._inner.margin(self._support_index(support), along, reach)
         if margin is None:
             return None
         distance, towards, is_fold, position, rotation = margin
@@ -439,13 +432,10 @@ class Equilibrium:
         Errors: `NoSensitivity` unless the equilibrium has converged to a minimum that its supports determine.
         """
         if self._sensitivity is None:
-            try:
-                self._sensitivity = Sensitivity(self._inner.sensitivity())
-            except ValueError as error:
-                raise NoSensitivity(str(error)) from None
+            self._sensitivity = Sensitivity(self._inner.sensitivity())
         return self._sensitivity
 
-    def jacobian(self, support: Literal["start", "end"] | float) -> Floats:
+    def jacobian(self, support: Place) -> Floats:
         """Derivatives of the spine's positions by the motion of a support, which is named as for `reaction`.
 
         The last axis is [translation, left world-axes rotation about the support point]; components that the support
@@ -457,22 +447,20 @@ class Equilibrium:
         """
         return self.sensitivity().jacobian(self._support_index(support))
 
-    def _support_index(self, support: Literal["start", "end"] | float) -> int:
+    def _support_index(self, support: Place) -> int:
         if isinstance(support, int | np.integer):
             count = len(self._inner.reactions)
             try:
                 return range(count)[int(support)]
             except IndexError:
-                raise NoSupport(f"support {support!r}: found {count} supports") from None
+                raise _no_support(support, f"found {count} supports") from None
         length = float(self.u[-1])
         place = {"start": 0.0, "end": length}.get(support) if isinstance(support, str) else float(support)
         places = [at for at, _, _ in self._inner.reactions]
         for index, at in enumerate(places):
             if place is not None and math.isclose(at, place, abs_tol=1e-9 * length):
                 return index
-        raise NoSupport(
-            f'support {support!r}: found supports at u = {places}, allowed one of them, "start", "end" or an index'
-        )
+        raise _no_support(support, f'found supports at u = {places}, allowed one of them, "start", "end" or an index')
 
     def surface(self, n_across: int = 9) -> Floats:
         """Points of the surface, on every rib from the −ζ edge to the +ζ edge.
@@ -569,10 +557,11 @@ def solve(
     `scenario` is none or `start` no shape.
     """
     core = core_of(scenario)
-    inner = _core.solve(core) if start is None else _core.solve_from(core, *_shape(start))
+    shape = None if start is None else _shape(start)
+    inner = _core.solve(core) if shape is None else _core.solve_from(core, *shape)
     equilibrium = Equilibrium(scenario, inner)
     if strict and equilibrium.status != "converged":
-        raise NotConverged(equilibrium)
+        raise NotConverged(equilibrium, shape)
     return equilibrium
 
 
@@ -613,6 +602,12 @@ def core_of(scenario: Scenario) -> _core.Scenario:
     if not isinstance(inner, _core.Scenario):
         raise InvalidArgument(f"scenario: found {type(scenario).__name__}, allowed a Scenario, as fishbone.load gives")
     return inner
+
+
+def _no_support(support: Place, found: str) -> NoSupport:
+    error = NoSupport(f"support {support!r}: {found}")
+    error.support = support
+    return error
 
 
 def _across(n_across: int) -> int:

@@ -6,13 +6,14 @@ import functools
 import math
 import re
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, get_args
 
 import numpy as np
 
 from fishbone import _core
 from fishbone.equilibrium import Equilibrium, Reaction, solve
-from fishbone.errors import InvalidArgument, NoBranch, NoPath
+from fishbone.errors import InvalidArgument
+from fishbone.names import Motion
 from fishbone.scenario import Scenario
 from fishbone.tracker import triple
 
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     from numpy.typing import NDArray
 
-    from fishbone.tracker import Place
+    from fishbone.names import End, Kind, Place
 
     Floats = NDArray[np.float64]
     Columns = dict[str, NDArray[Any]]
@@ -31,9 +32,6 @@ SCHEMA = "fishbone.diagram/1"
 MAX_STEP = 1.0
 MIN_STATES, MAX_STATES = 2, 100_000
 MAX_BRANCHES = 1000
-
-Kind = Literal["fold", "pitchfork", "transcritical", "bifurcation"]
-End = Literal["range", "event", "closed", "budget", "lost", "edges", "taut"]
 
 
 class Poses(NamedTuple):
@@ -46,7 +44,7 @@ class Poses(NamedTuple):
     """Each a position and a rotation vector, world axes, shapes (3,)."""
     support: Place = "end"
     """Which support, named as for `Equilibrium.reaction`; it must hold a position and a rotation."""
-    motion: Literal["straight", "screw"] = "straight"
+    motion: Motion = "straight"
     """From one pose to the next: the point on a straight line and the frame about a fixed axis, or both as a screw; by
     the shorter turn either way."""
 
@@ -310,13 +308,7 @@ def follow(  # noqa: PLR0913 - keywords all but two
         # What is no path is refused before a long solve.
         way = _changed(scenario if isinstance(scenario, Scenario) else scenario.scenario, path)
         start = _solved(scenario)
-    try:
-        inner = _core.follow(start._inner, way.inner, float(step), int(states), int(branches), progress)  # noqa: SLF001
-    except ValueError as error:
-        # What `progress` or a signal's handler has raised comes from deeper down.
-        if error.__traceback__ is not None and error.__traceback__.tb_next is not None:
-            raise
-        raise NoBranch(str(error)) from None
+    inner = _core.follow(start._inner, way.inner, float(step), int(states), int(branches), progress)  # noqa: SLF001
     return Diagram(inner, start, way.parameter_name, way.support)
 
 
@@ -340,10 +332,7 @@ def _changed(scenario: Scenario, path: Mapping[str, Any]) -> _Way:
     for field in fields:
         if fields.count(field) > 1:
             raise InvalidArgument(f"{field}: found twice in the path, allowed once")
-    try:
-        inner = _core.Path.numbers(scenario._inner, numbers)  # noqa: SLF001 - of this package
-    except ValueError as error:
-        raise NoPath(str(error)) from None
+    inner = _core.Path.numbers(scenario._inner, numbers)  # noqa: SLF001 - of this package
     moved = (re.match(r"supports\[(\d+)\]", field) for field in fields)
     support = next((int(found[1]) for found in moved if found is not None), None)
     return _Way(inner, fields[0] if len(fields) == 1 else "share of the path", support)
@@ -365,8 +354,10 @@ def _numbers(field: str, value: Any) -> Iterator[tuple[str, float]]:  # noqa: AN
 
 def _led(start: Equilibrium, path: Poses) -> _Way:
     """The path of a support's poses."""
-    if path.motion not in {"straight", "screw"}:
-        raise InvalidArgument(f'motion: found {path.motion!r}, allowed "straight" or "screw"')
+    motions = get_args(Motion)
+    if path.motion not in motions:
+        allowed = " or ".join(f'"{motion}"' for motion in motions)
+        raise InvalidArgument(f"motion: found {path.motion!r}, allowed {allowed}")
     if not isinstance(path.poses, Iterable):
         raise InvalidArgument(f"poses: found {path.poses!r}, allowed pairs of a position and a rotation")
     poses = []
@@ -378,10 +369,7 @@ def _led(start: Equilibrium, path: Poses) -> _Way:
         poses.append((triple(f"poses[{index}][0]", position), triple(f"poses[{index}][1]", rotation)))
     # The source's method knows no reactions, and cannot be followed wherever the support is.
     support = _index_of(start, path.support) if start._inner.reactions else 0  # noqa: SLF001 - of this package
-    try:
-        inner = _core.Path.poses(start.scenario._inner, support, poses, path.motion == "screw")  # noqa: SLF001
-    except ValueError as error:
-        raise NoPath(str(error)) from None
+    inner = _core.Path.poses(start.scenario._inner, support, poses, path.motion)  # noqa: SLF001 - of this package
     return _Way(inner, "place on the path", support)
 
 

@@ -61,7 +61,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from fishbone.equilibrium import Floats
-    from fishbone.tracker import Place
+    from fishbone.names import Place
 
     Style = dict[str, Any]
 

@@ -16,12 +16,13 @@ if TYPE_CHECKING:
 
     from fishbone.equilibrium import Equilibrium, Floats
     from fishbone.follow import Branch, Diagram, Event
+    from fishbone.names import End
 
 DIGITS = 5
 """Significant digits: what a default mesh supports, about."""
 RIBS_MEET = 1e-3
 """Bend radius, in widths, below which it says no more than that ribs meet there."""
-ENDS = {
+ENDS: dict[End, str] = {
     "closed": "ends where it began",
     "budget": "has used up its states before the end of the path",
     "lost": "ends where no step, however short, leads on",

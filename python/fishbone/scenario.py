@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -99,54 +100,58 @@ def load(path: str | os.PathLike[str]) -> Scenario:
     Errors: `InvalidScenario`, one line that starts with the file.
     """
     path = Path(path)
-    try:
-        return Scenario._wrap(_parser(path)(_read(path)))  # noqa: SLF001 - its own module
-    except (OSError, ValueError) as error:
-        raise InvalidScenario(f"{path}: {_one_line(error)}") from None
-
-
-def _parser(path: Path) -> Any:  # noqa: ANN401 - text to core scenario
-    try:
-        return _PARSERS[path.suffix.lower()]
-    except KeyError:
-        raise InvalidScenario(f"file name: found {path.suffix or 'no suffix'}, allowed .toml or .json") from None
+    parse = _PARSERS.get(path.suffix.lower())
+    if parse is None:
+        raise _invalid("file name", path.suffix or "no suffix", ".toml or .json", path)
+    return Scenario._wrap(parse(_read(path), str(path)))  # noqa: SLF001 - its own module
 
 
 def _read(path: Path) -> str:
-    # A pipe would keep us waiting for whoever may never write into it.
-    if path.exists() and not path.is_file():
-        raise InvalidScenario("file: found a folder, pipe or device, allowed a file")
-    with path.open("rb") as file:
-        content = file.read(MAX_BYTES + 1)
+    try:
+        # A pipe would keep us waiting for whoever may never write into it.
+        is_other = path.exists() and not path.is_file()
+        content = b"" if is_other else _content(path)
+    except OSError as error:
+        raise _invalid("file", (error.strerror or "an error").lower(), "a readable file", path) from None
+    except ValueError:
+        raise _invalid("file", "a name that no file can have", "a readable file", path) from None
+    if is_other:
+        raise _invalid("file", "a folder, pipe or device", "a file", path)
     if len(content) > MAX_BYTES:
-        raise InvalidScenario(
-            f"file size: found over {MAX_BYTES // 1_000_000} MB, allowed up to {MAX_BYTES // 1_000_000} MB"
-        )
+        most = f"{MAX_BYTES // 1_000_000} MB"
+        raise _invalid("file size", f"over {most}", f"up to {most}", path)
     if not content.strip():
-        raise InvalidScenario("file: found nothing in it, allowed a scenario")
-    return content.decode("utf-8-sig")
+        raise _invalid("file", "nothing in it", "a scenario", path)
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise _invalid("encoding", f"a byte at {error.start} that is not UTF-8", "UTF-8", path) from None
 
 
-def _one_line(error: Exception) -> str:
-    if isinstance(error, UnicodeDecodeError):
-        return f"encoding: found a byte at {error.start} that is not UTF-8, allowed UTF-8"
-    if isinstance(error, OSError):
-        return f"file: found {(error.strerror or 'an error').lower()}, allowed a readable file"
-    return " ".join(str(error).split())
+def _content(path: Path) -> bytes:
+    with path.open("rb") as file:
+        return file.read(MAX_BYTES + 1)
+
+
+def _invalid(field: str, found: str, allowed: str, file: Path | None = None) -> InvalidScenario:
+    """What the core says of a field, said of what never comes to it."""
+    text = " ".join(f"{field}: found {found}, allowed {allowed}".split())
+    error = InvalidScenario(text if file is None else f"{file}: {text}")
+    error.reason = "invalid"
+    error.field, error.found, error.allowed = field, found, allowed
+    error.file = None if file is None else str(file)
+    return error
 
 
 def _from_dict(tables: Table) -> _core.Scenario:
-    try:
-        return _core.Scenario.from_json(_to_json(tables))
-    except ValueError as error:
-        raise InvalidScenario(_one_line(error)) from None
+    return _core.Scenario.from_json(_to_json(tables))
 
 
 def _to_json(tables: Table) -> str:
     try:
         return json.dumps(_plain(tables, ""))
     except RecursionError:
-        raise InvalidScenario("scenario: found tables nested too deep, allowed those of a scenario file") from None
+        raise _invalid("scenario", "tables nested too deep", "those of a scenario file") from None
 
 
 def _plain(value: Any, field: str) -> Any:  # noqa: ANN401 - whatever a caller may bring
@@ -158,9 +163,9 @@ def _plain(value: Any, field: str) -> Any:  # noqa: ANN401 - whatever a caller m
     if isinstance(value, (list, tuple)):
         return [_plain(item, f"{field}[{index}]") for index, item in enumerate(value)]
     if isinstance(value, float) and not math.isfinite(value):
-        raise InvalidScenario(f"{field}: found {value}, allowed a finite number")
+        raise _invalid(field, str(value), "a finite number")
+    if isinstance(value, int) and value.bit_length() > sys.float_info.max_exp:
+        raise _invalid(field, "an integer larger than all finite numbers", "a finite number")
     if value is None or isinstance(value, (bool, int, float, str)):
         return value
-    raise InvalidScenario(
-        f"{field or 'scenario'}: found a {type(value).__name__}, allowed what a scenario file can hold"
-    )
+    raise _invalid(field or "scenario", f"a {type(value).__name__}", "what a scenario file can hold")

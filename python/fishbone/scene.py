@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, get_args
 
 import numpy as np
 from matplotlib.collections import PathCollection
 from matplotlib.path import Path
 
 from fishbone.errors import InvalidArgument
+from fishbone.names import Axis
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -234,7 +235,7 @@ def _draw_holds(axes: Axes, equilibrium: Equilibrium, view: View) -> None:
         if kind == "place":
             axes.plot(*view.page(place), zorder=4, **PIN)
             continue
-        column = ("xi", "eta", "zeta").index(support["hinge"] if kind == "hinge" else "zeta")
+        column = get_args(Axis).index(support["hinge"] if kind == "hinge" else "zeta")
         bar = place + np.outer([-reach, reach], frame[:, column])
         axes.plot(*view.page(bar).T, zorder=4, **(HINGE if kind == "hinge" else CLAMP))
     for link in tables.get("links", []):

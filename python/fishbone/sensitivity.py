@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fishbone.errors import InvalidArgument, NoSensitivity
+from fishbone.errors import InvalidArgument
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -97,10 +97,7 @@ class Sensitivity:
             float(_array("width", width, ())),
             _array("gravity", gravity, (3,)).tolist(),
         )
-        try:
-            return Change(*self._inner.forward(*arguments))
-        except ValueError as error:
-            raise NoSensitivity(str(error)) from None
+        return Change(*self._inner.forward(*arguments))
 
     def adjoint(  # noqa: PLR0913, PLR0917
         self,
@@ -128,10 +125,7 @@ class Sensitivity:
             _array("reactions", reactions, (m, 6)),
             float(_array("energy", energy, ())),
         )
-        try:
-            supports, rigidity, natural_bend, width, gravity = self._inner.adjoint(*arguments)
-        except ValueError as error:
-            raise NoSensitivity(str(error)) from None
+        supports, rigidity, natural_bend, width, gravity = self._inner.adjoint(*arguments)
         return Gradient(supports, rigidity, natural_bend, width, np.array(gravity))
 
     def jacobian(self, support: int) -> Floats:
@@ -144,10 +138,7 @@ class Sensitivity:
         count, _, _ = self._inner.shape
         if not 0 <= support < count:
             raise InvalidArgument(f"support: found {support}, allowed 0 to {count - 1}")
-        try:
-            return self._inner.jacobian(support)
-        except ValueError as error:
-            raise NoSensitivity(str(error)) from None
+        return self._inner.jacobian(support)
 
 
 def _array(name: str, value: npt.ArrayLike | None, shape: tuple[int, ...]) -> Floats:

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from fishbone.equilibrium import Equilibrium, Reaction, Status, solve
-from fishbone.errors import InvalidArgument, NoTracker
+from fishbone.equilibrium import Equilibrium, Reaction, solve
+from fishbone.errors import InvalidArgument
 from fishbone.scenario import Scenario
 
 if TYPE_CHECKING:
     import numpy.typing as npt
     from numpy.typing import NDArray
 
+    from fishbone.names import Place, Status
+
     Floats = NDArray[np.float64]
-    Place = Literal["start", "end"] | float
 
 
 class Update(NamedTuple):
@@ -47,10 +48,7 @@ class Tracker:
         self._start = solve(scenario)
         # The source's method knows no reactions, and cannot be followed wherever the support is.
         index = self._index_of(support) if self._start._inner.reactions else 0  # noqa: SLF001 - of this package
-        try:
-            self._inner = self._start._inner.tracker(index)  # noqa: SLF001 - of this package
-        except ValueError as error:
-            raise NoTracker(str(error)) from None
+        self._inner = self._start._inner.tracker(index)  # noqa: SLF001 - of this package
 
     def update(self, position: npt.ArrayLike, rotation: npt.ArrayLike) -> Update:
         """Moves the support to a position and a rotation vector, world axes, and the belt with it.

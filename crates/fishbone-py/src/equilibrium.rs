@@ -1,12 +1,14 @@
 //! `_core.Equilibrium` and the solve that makes it.
 
 use crate::array::{self, Grid, Points, Scalars, Triangles};
+use crate::errors::raised;
 use crate::scenario::Scenario;
-use crate::sensitivity::{Sensitivity, refused};
+use crate::sensitivity::Sensitivity;
 use crate::tracker::Tracker;
 use fishbone::board::curve::Curve;
-use fishbone::equilibrium::{self, Status};
+use fishbone::equilibrium;
 use fishbone::geometry::Wrench;
+use fishbone::names::Named;
 use fishbone::problem::Problem;
 use fishbone::strip::spine::Piece;
 use fishbone::surface::{self, Rib};
@@ -55,15 +57,6 @@ pub(crate) fn solve_from(
     match signals.raised {
         Some(error) => Err(error),
         None => found.map_err(|error| PyValueError::new_err(error.to_string())),
-    }
-}
-
-/// The name of a status in results.
-pub(crate) fn status_name(status: Status) -> &'static str {
-    match status {
-        Status::Converged => "converged",
-        Status::Infeasible => "infeasible",
-        Status::NotConverged => "not_converged",
     }
 }
 
@@ -150,7 +143,7 @@ pub(crate) struct Equilibrium {
 impl Equilibrium {
     #[getter]
     fn status(&self) -> &'static str {
-        status_name(self.solved.status)
+        self.solved.status.name()
     }
 
     #[getter]
@@ -469,7 +462,7 @@ impl Equilibrium {
     /// (distance, direction, whether it is a fold, position, rotation vector) of the nearest loss of stability, along a
     /// direction or wherever it is; None where there is none within reach.
     ///
-    /// Errors: `ValueError`, one line, where there is no stability to lose; whatever a signal handler raises.
+    /// Errors: `NoMargin`; whatever a signal handler raises.
     #[pyo3(signature = (support, direction, reach))]
     fn margin(
         &self,
@@ -493,7 +486,7 @@ impl Equilibrium {
         if let Some(error) = signals.raised {
             return Err(error);
         }
-        let margin = margin.map_err(|error| PyValueError::new_err(error.to_string()))?;
+        let margin = margin.map_err(|error| raised(py, &error))?;
         Ok(margin.map(|margin| {
             (
                 margin.distance,
@@ -508,10 +501,10 @@ impl Equilibrium {
     /// (eigenvalue, translation, rotation, bend, rib slope) of the lowest modes, found with the GIL released.
     ///
     /// Shapes: (n, 3), (n, 3), (n,), (n,).
-    /// Errors: `ValueError`, one line, where it has none.
+    /// Errors: `NoModes`.
     fn modes<'py>(&self, py: Python<'py>, count: usize) -> PyResult<Vec<Mode<'py>>> {
         let modes = py.detach(|| self.solved.modes(count));
-        let modes = modes.map_err(|error| PyValueError::new_err(error.to_string()))?;
+        let modes = modes.map_err(|error| raised(py, &error))?;
         let mode = |mode: fishbone::analysis::modes::Mode| {
             (
                 mode.eigenvalue,
@@ -526,17 +519,19 @@ impl Equilibrium {
 
     /// Follows it while a support moves.
     ///
-    /// Errors: `ValueError`, one line, where there is nothing to follow.
-    fn tracker(&self, support: usize) -> PyResult<Tracker> {
-        Tracker::new(&self.solved, support)
+    /// Errors: `NoTracker`.
+    fn tracker(&self, py: Python<'_>, support: usize) -> PyResult<Tracker> {
+        Tracker::new(py, &self.solved, support)
     }
 
     /// Its first-order conditions, factorised with the GIL released.
     ///
-    /// Errors: `ValueError`, one line, where it has no derivatives.
+    /// Errors: `NoSensitivity`.
     fn sensitivity(&self, py: Python<'_>) -> PyResult<Sensitivity> {
         let sensitivity = py.detach(|| self.solved.sensitivity());
-        sensitivity.map(Sensitivity::new).map_err(refused)
+        sensitivity
+            .map(Sensitivity::new)
+            .map_err(|error| raised(py, &error))
     }
 
     /// The result schema as JSON, without `solve_time`.

@@ -2,9 +2,11 @@
 
 use crate::array::{self, Grid, Points, Scalars};
 use crate::equilibrium::{Equilibrium, Signals};
+use crate::errors::raised;
 use crate::scenario::Scenario;
-use fishbone::analysis::continuation::{self as core, End, Settings, Summary};
+use fishbone::analysis::continuation::{self as core, Settings, Summary};
 use fishbone::analysis::path::{self, Motion};
+use fishbone::names::Named;
 use nalgebra::Vector3;
 use numpy::IntoPyArray;
 use pyo3::exceptions::PyValueError;
@@ -18,42 +20,40 @@ pub(crate) struct Path(path::Path);
 impl Path {
     /// Numbers of a scenario that change together, each a field and its last value.
     ///
-    /// Errors: `ValueError`, one line.
+    /// Errors: `NoPath`.
     #[staticmethod]
-    fn numbers(scenario: &Scenario, changes: Vec<(String, f64)>) -> PyResult<Self> {
+    fn numbers(py: Python<'_>, scenario: &Scenario, changes: Vec<(String, f64)>) -> PyResult<Self> {
         path::Path::numbers(&scenario.0, &changes)
             .map(Self)
-            .map_err(refused)
+            .map_err(|error| raised(py, &error))
     }
 
-    /// A support that moves through poses, each a position and a rotation vector, as a screw or straight.
+    /// A support that moves through poses, each a position and a rotation vector, from one to the next by a motion's name.
     ///
-    /// Errors: `ValueError`, one line.
+    /// Errors: `NoPath`; `ValueError` where no motion has that name.
     #[staticmethod]
     fn poses(
+        py: Python<'_>,
         scenario: &Scenario,
         support: usize,
         poses: Vec<([f64; 3], [f64; 3])>,
-        screw: bool,
+        motion: &str,
     ) -> PyResult<Self> {
         let poses: Vec<_> = poses
             .into_iter()
             .map(|(position, rotation)| (Vector3::from(position), Vector3::from(rotation)))
             .collect();
-        let motion = if screw {
-            Motion::Screw
-        } else {
-            Motion::Straight
-        };
-        path::Path::poses(&scenario.0, support, &poses, motion)
+        let motion = Motion::ALL.iter().find(|known| known.name() == motion);
+        let motion = motion.ok_or_else(|| PyValueError::new_err("no name of a motion"))?;
+        path::Path::poses(&scenario.0, support, &poses, *motion)
             .map(Self)
-            .map_err(refused)
+            .map_err(|error| raised(py, &error))
     }
 }
 
 /// Follows an equilibrium along a path with the GIL released; `progress(branch, share of the path)` is called now and then.
 ///
-/// Errors: `ValueError`, one line, where there is nothing to follow; whatever `progress` or a signal handler raises.
+/// Errors: `NoBranch`; whatever `progress` or a signal handler raises.
 #[pyfunction]
 #[pyo3(signature = (equilibrium, path, step, states, branches, progress=None))]
 pub(crate) fn follow(
@@ -83,12 +83,8 @@ pub(crate) fn follow(
     });
     match signals.raised {
         Some(error) => Err(error),
-        None => found.map(Diagram).map_err(refused),
+        None => found.map(Diagram).map_err(|error| raised(py, &error)),
     }
-}
-
-fn refused(error: impl std::error::Error) -> PyErr {
-    PyValueError::new_err(error.to_string())
 }
 
 /// The branches of equilibria along a path.
@@ -139,16 +135,7 @@ impl Diagram {
 
     /// Why a branch ends.
     fn end(&self, branch: usize) -> &'static str {
-        match self.0.branches[branch].end {
-            End::Range => "range",
-            End::Event => "event",
-            End::Closed => "closed",
-            End::Budget => "budget",
-            End::Lost => "lost",
-            End::Edges => "edges",
-            End::Taut => "taut",
-            End::Interrupted => "interrupted",
-        }
+        self.0.branches[branch].end.name()
     }
 
     /// Negative modes of every state of a branch.

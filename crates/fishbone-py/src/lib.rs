@@ -4,7 +4,9 @@ mod array;
 mod batch;
 mod branches;
 mod equilibrium;
+mod errors;
 mod follow;
+mod names;
 mod scenario;
 mod sensitivity;
 mod tracker;
@@ -20,6 +22,8 @@ mod _core {
     use crate::equilibrium::{Equilibrium, solve, solve_from};
     #[pymodule_export]
     use crate::follow::{Diagram, Path, follow};
+    #[pymodule_export]
+    use crate::names::names;
     #[pymodule_export]
     use crate::scenario::Scenario;
     #[pymodule_export]

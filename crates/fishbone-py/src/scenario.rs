@@ -1,10 +1,11 @@
 //! `_core.Scenario`.
 
+use crate::errors::invalid_scenario;
 use fishbone::problem::Problem;
 use fishbone::scenario;
 use fishbone::scenario::error::ScenarioError;
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::PyString;
 
 /// A validated scenario: what is solved.
 #[pyclass(frozen, module = "fishbone._core")]
@@ -14,18 +15,20 @@ pub(crate) struct Scenario(pub(crate) Problem);
 impl Scenario {
     /// Reads a scenario file's text.
     ///
-    /// Errors: `ValueError`, one line "field: found …, allowed …".
+    /// Errors: `InvalidScenario`, one line "field: found …, allowed …" after the file's name, where it has one.
     #[staticmethod]
-    fn from_toml(text: &str) -> PyResult<Self> {
-        checked(scenario::Scenario::from_toml(text))
+    #[pyo3(signature = (text, file=None))]
+    fn from_toml(py: Python<'_>, text: &str, file: Option<&Bound<'_, PyString>>) -> PyResult<Self> {
+        checked(py, scenario::Scenario::from_toml(text), file)
     }
 
     /// Reads the same structure as JSON.
     ///
-    /// Errors: `ValueError`, one line "field: found …, allowed …".
+    /// Errors: those of `from_toml`.
     #[staticmethod]
-    fn from_json(text: &str) -> PyResult<Self> {
-        checked(scenario::Scenario::from_json(text))
+    #[pyo3(signature = (text, file=None))]
+    fn from_json(py: Python<'_>, text: &str, file: Option<&Bound<'_, PyString>>) -> PyResult<Self> {
+        checked(py, scenario::Scenario::from_json(text), file)
     }
 
     /// The scenario, normalised, as JSON.
@@ -34,9 +37,13 @@ impl Scenario {
     }
 }
 
-fn checked(result: Result<scenario::Scenario, ScenarioError>) -> PyResult<Scenario> {
+fn checked(
+    py: Python<'_>,
+    result: Result<scenario::Scenario, ScenarioError>,
+    file: Option<&Bound<'_, PyString>>,
+) -> PyResult<Scenario> {
     result
         .and_then(Problem::new)
         .map(Scenario)
-        .map_err(|error| PyValueError::new_err(error.to_string()))
+        .map_err(|error| invalid_scenario(py, &error, file))
 }

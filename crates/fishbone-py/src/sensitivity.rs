@@ -1,18 +1,18 @@
 //! `_core.Sensitivity`.
 
 use crate::array::{self, Grid, Points, Scalars};
+use crate::errors::raised;
 use fishbone::analysis::sensitivity::{self, Change, Motion, NoSensitivity, Parameters};
 use fishbone::geometry::Wrench;
 use nalgebra::Vector3;
 use numpy::ndarray::{ArrayView1, ArrayView2};
 use numpy::{IntoPyArray, PyReadonlyArray1, PyReadonlyArray2};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::sync::{Mutex, PoisonError};
 
 /// The factorised first-order conditions of an equilibrium.
 ///
-/// Errors: `ValueError`, one line, where the supports cannot move so.
+/// Errors: `NoSensitivity` where the supports cannot move so.
 #[pyclass(frozen, module = "fishbone._core")]
 pub(crate) struct Sensitivity {
     inner: Mutex<sensitivity::Sensitivity>,
@@ -36,13 +36,8 @@ impl Sensitivity {
     ) -> PyResult<T> {
         // Nothing of a product that has panicked is used by the next.
         py.detach(|| product(&mut self.inner.lock().unwrap_or_else(PoisonError::into_inner)))
-            .map_err(refused)
+            .map_err(|error| raised(py, &error))
     }
-}
-
-/// As `ValueError`.
-pub(crate) fn refused(error: NoSensitivity) -> PyErr {
-    PyValueError::new_err(error.to_string())
 }
 
 #[pymethods]

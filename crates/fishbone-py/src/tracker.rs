@@ -1,12 +1,13 @@
 //! `_core.Tracker`.
 
 use crate::array::{self, Grid, Points, Scalars};
-use crate::equilibrium::{Equilibrium, Signals, status_name};
+use crate::equilibrium::{Equilibrium, Signals};
+use crate::errors::raised;
 use crate::scenario::Scenario;
-use fishbone::analysis::tracking::{self as core, NoTracker};
+use fishbone::analysis::tracking as core;
+use fishbone::names::Named;
 use nalgebra::Vector3;
 use numpy::IntoPyArray;
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -15,15 +16,15 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 pub(crate) struct Tracker(Mutex<core::Tracker>);
 
 impl Tracker {
-    /// Errors: `ValueError`, one line, where there is nothing to follow.
+    /// Errors: `NoTracker`.
     pub(crate) fn new(
+        py: Python<'_>,
         equilibrium: &fishbone::equilibrium::Equilibrium,
         support: usize,
     ) -> PyResult<Self> {
-        let refused = |error: NoTracker| PyValueError::new_err(error.to_string());
         core::Tracker::new(equilibrium, support)
             .map(|tracker| Self(Mutex::new(tracker)))
-            .map_err(refused)
+            .map_err(|error| raised(py, &error))
     }
 
     fn lock(&self) -> MutexGuard<'_, core::Tracker> {
@@ -52,7 +53,7 @@ impl Tracker {
         match signals.raised {
             Some(error) => Err(error),
             None => Ok((
-                status_name(update.status),
+                update.status.name(),
                 update.snapped,
                 update.energy,
                 update.iterations,

@@ -6,6 +6,7 @@
 //!
 //! | room | what it knows |
 //! |---|---|
+//! | [`names`] | the words for variants in files and other languages |
 //! | [`geometry`] | rotations, poses, twists |
 //! | [`strip`] | energy and motion of the strip between neighbouring ribs, Eq. (34) |
 //! | [`board`] | material, flat spine, outline, how ribs lie on the board |
@@ -49,6 +50,7 @@ pub mod board;
 pub mod equilibrium;
 pub mod geometry;
 pub mod io;
+pub mod names;
 pub mod problem;
 pub mod ritz;
 pub mod scenario;

@@ -4,7 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The rooms from the lowest to the highest. A file may name its own room and those before it.
-const ROOMS: [&str; 11] = [
+const ROOMS: [&str; 12] = [
+    "names",
     "geometry",
     "strip",
     "board",

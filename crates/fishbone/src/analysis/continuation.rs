@@ -4,9 +4,11 @@ use crate::analysis::path::Path;
 use crate::analysis::symmetry::{SAME, are_twins};
 use crate::equilibrium::{Equilibrium, Stability, Status, Uncertified, is_settled, of_solution};
 use crate::geometry::Wrench;
+use crate::names::named;
 use crate::problem::program::{BeltPoint, BeltProgram};
 use crate::problem::{Mesh, Problem};
 use crate::surface;
+use serde::Serialize;
 use stagewise::{Continuation, Distance, Events, Family, Pace, Residuals, Stationary, Turn};
 use std::ops::ControlFlow;
 use thiserror::Error;
@@ -18,25 +20,27 @@ type Crossing = stagewise::Event<BeltPoint, 8>;
 /// A curve of equilibria that may have been interrupted.
 type Curve = stagewise::Curve<BeltPoint, (), 8>;
 
-/// Why a branch ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum End {
-    /// The path ends.
-    Range,
-    /// At an event beyond which the branch would be its own mirror image.
-    Event,
-    /// The branch has come back to where it began.
-    Closed,
-    /// All states that were allowed are used up.
-    Budget,
-    /// No step, however short, leads on.
-    Lost,
-    /// Ribs reach edges beside a bend that held none before, or leave those that held them.
-    Edges,
-    /// The belt is drawn straight.
-    Taut,
-    /// The caller asked to end.
-    Interrupted,
+named! {
+    /// Why a branch ended.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+    pub enum End {
+        /// The path ends.
+        Range = "range",
+        /// At an event beyond which the branch would be its own mirror image.
+        Event = "event",
+        /// The branch has come back to where it began.
+        Closed = "closed",
+        /// All states that were allowed are used up.
+        Budget = "budget",
+        /// No step, however short, leads on.
+        Lost = "lost",
+        /// Ribs reach edges beside a bend that held none before, or leave those that held them.
+        Edges = "edges",
+        /// The belt is drawn straight.
+        Taut = "taut",
+        /// The caller asked to end.
+        Interrupted = "interrupted",
+    }
 }
 
 impl From<stagewise::End<()>> for End {
@@ -65,6 +69,11 @@ pub enum NoBranch {
     )]
     Singular,
 }
+
+named!(impl NoBranch {
+    Singular = "singular",
+    ..Uncertified,
+});
 
 /// How far to look. Lengths along a branch count the parameter of the path, from 0 to its length, and the motion of the belt
 /// in U alike.
@@ -156,28 +165,18 @@ pub struct Summary {
     pub residuals: Residuals,
 }
 
-/// What happens at an event.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
-    /// The branch turns back.
-    Fold,
-    /// Another branch crosses that is its own mirror image, or touches it to first order.
-    Pitchfork,
-    /// Another branch crosses at an angle.
-    Transcritical,
-    /// Other branches cross that could not be followed.
-    Bifurcation,
-}
-
-impl Kind {
-    /// Its name in results.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Fold => "fold",
-            Self::Pitchfork => "pitchfork",
-            Self::Transcritical => "transcritical",
-            Self::Bifurcation => "bifurcation",
-        }
+named! {
+    /// What happens at an event.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+    pub enum Kind {
+        /// The branch turns back.
+        Fold = "fold",
+        /// Another branch crosses that is its own mirror image, or touches it to first order.
+        Pitchfork = "pitchfork",
+        /// Another branch crosses at an angle.
+        Transcritical = "transcritical",
+        /// Other branches cross that could not be followed.
+        Bifurcation = "bifurcation",
     }
 }
 

@@ -4,6 +4,7 @@ use crate::analysis::continuation::{NoBranch, is_near_limit, meshed};
 use crate::analysis::path::{Motion, NoPath, Path};
 use crate::equilibrium::{Equilibrium, Uncertified, is_settled};
 use crate::geometry::{Pose, exp, log};
+use crate::names::named;
 use crate::problem::Mesh;
 use crate::problem::program::{BeltPoint, BeltProgram, rows_of};
 use nalgebra::{Vector3, Vector6};
@@ -56,6 +57,15 @@ pub enum NoMargin {
     )]
     Lost(f64),
 }
+
+named!(impl NoMargin {
+    NotStable = "not_stable",
+    NotClamped = "not_clamped",
+    Lost = "lost",
+    ..Uncertified,
+    ..NoBranch,
+    ..NoPath,
+});
 
 /// The boundary of stability, as it is met along a direction.
 struct Boundary {

@@ -2,6 +2,7 @@
 
 use crate::analysis::sensitivity::Motion;
 use crate::equilibrium::{Equilibrium, Uncertified};
+use crate::names::named;
 use crate::problem::program::NodeVector;
 use stagewise::Singular;
 use thiserror::Error;
@@ -34,6 +35,11 @@ pub enum NoModes {
     #[error("the second variation could not be factorised")]
     Singular,
 }
+
+named!(impl NoModes {
+    Singular = "singular",
+    ..Uncertified,
+});
 
 impl Equilibrium {
     /// The lowest modes, rising; fewer than `count` where the mesh has no more.

@@ -1,9 +1,11 @@
 //! Ways through the space of problems: one number or several that change together, or a support that moves.
 
 use crate::geometry::{Pose, Twist, exp, log};
+use crate::names::named;
 use crate::problem::Problem;
 use crate::scenario::error::ScenarioError;
 use nalgebra::Vector3;
+use serde::Serialize;
 use serde_json::Value;
 use thiserror::Error;
 
@@ -35,14 +37,16 @@ struct Number {
     to: f64,
 }
 
-/// How a support moves from one pose to the next.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Motion {
-    /// Its point on a straight line, its frame about a fixed axis, both at a steady rate.
-    #[default]
-    Straight,
-    /// As a screw turns: about a fixed axis and along it, both at a steady rate.
-    Screw,
+named! {
+    /// How a support moves from one pose to the next.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+    pub enum Motion {
+        /// Its point on a straight line, its frame about a fixed axis, both at a steady rate.
+        #[default]
+        Straight = "straight",
+        /// As a screw turns: about a fixed axis and along it, both at a steady rate.
+        Screw = "screw",
+    }
 }
 
 /// Why there is no such path.
@@ -70,10 +74,22 @@ pub enum NoPath {
     /// The support may not be held at one of the poses, counted from 0.
     #[error("poses[{0}]: {1}")]
     NoPose(usize, String),
-    /// The scenario at its end is none.
+    /// The scenario at its end is not valid.
     #[error("at the end of the path, {0}")]
-    Invalid(String),
+    Invalid(ScenarioError),
+    /// The scenario at its end cannot be read: a number is not of the kind that its field takes.
+    #[error("at the end of the path, {0}")]
+    Unreadable(String),
 }
+
+named!(impl NoPath {
+    NoNumber = "no_number",
+    Nothing = "nothing",
+    NotClamped = "not_clamped",
+    NoPose = "no_pose",
+    Invalid = "invalid",
+    Unreadable = "unreadable",
+});
 
 /// A value that is no number as text; by its kind where that is long.
 fn shown(value: &Value) -> String {
@@ -193,7 +209,7 @@ impl Path {
         self.problem(place).ok()
     }
 
-    fn problem(&self, place: f64) -> Result<Problem, String> {
+    fn problem(&self, place: f64) -> Result<Problem, NoPath> {
         match &self.change {
             Change::Numbers { base, numbers } => {
                 let mut tables = base.clone();
@@ -202,8 +218,9 @@ impl Path {
                         *value = number.at(place).into();
                     }
                 }
-                let scenario = serde_json::from_value(tables).map_err(|error| error.to_string())?;
-                Problem::new(scenario).map_err(|error| error.to_string())
+                let scenario = serde_json::from_value(tables)
+                    .map_err(|error| NoPath::Unreadable(error.to_string()))?;
+                Problem::new(scenario).map_err(NoPath::Invalid)
             }
             Change::Poses {
                 support,
@@ -213,13 +230,13 @@ impl Path {
                 let leg = (place.max(0.0) as usize).min(poses.len() - 2);
                 let pose = motion.between(&poses[leg], &poses[leg + 1], place - leg as f64);
                 let moved = self.base.with_support_pose(*support, &pose);
-                moved.map_err(|error| error.to_string())
+                moved.map_err(NoPath::Invalid)
             }
         }
     }
 
     fn checked(self) -> Result<Self, NoPath> {
-        self.problem(self.length()).map_err(NoPath::Invalid)?;
+        self.problem(self.length())?;
         Ok(self)
     }
 }

@@ -11,6 +11,7 @@ mod system;
 
 use crate::equilibrium::{Equilibrium, Uncertified};
 use crate::geometry::Wrench;
+use crate::names::named;
 use nalgebra::{Matrix3x6, Vector3};
 use scales::Scales;
 use stagewise::{Response, Singular};
@@ -87,6 +88,15 @@ pub enum NoSensitivity {
     #[error("the belt between its supports has no slack: they cannot move each by itself")]
     NoSlack,
 }
+
+named!(impl NoSensitivity {
+    Marginal = "marginal",
+    Flat = "flat",
+    Saddle = "saddle",
+    Redundant = "redundant",
+    NoSlack = "no_slack",
+    ..Uncertified,
+});
 
 /// A vector of the first-order conditions.
 type Step = stagewise::Direction<8>;

@@ -2,6 +2,7 @@
 
 use crate::equilibrium::{Equilibrium, Status, Uncertified, is_settled, of_solution, solve_near};
 use crate::geometry::{Pose, Wrench, exp};
+use crate::names::named;
 use crate::problem::program::{BeltPoint, BeltProgram, Piece, rows_of};
 use crate::problem::{Problem, Units};
 use crate::scenario::error::ScenarioError;
@@ -33,6 +34,13 @@ pub enum NoTracker {
     #[error("the equilibrium is no strict minimum of the energy: there is no one branch to follow")]
     Marginal,
 }
+
+named!(impl NoTracker {
+    NotClamped = "not_clamped",
+    NoSupport = "no_support",
+    Marginal = "marginal",
+    ..Uncertified,
+});
 
 /// What became of a belt as its support moved.
 #[derive(Debug, Clone, PartialEq)]

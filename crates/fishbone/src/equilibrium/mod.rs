@@ -6,6 +6,7 @@ mod intrinsic;
 mod search;
 mod stability;
 
+use crate::names::named;
 pub use stability::Stability;
 
 use crate::geometry::{Pose, Wrench};
@@ -22,16 +23,17 @@ use thiserror::Error;
 
 pub(crate) use intrinsic::{is_settled, of_solution};
 
-/// How a solve ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Status {
-    /// All residuals are within the tolerance.
-    Converged,
-    /// No shape of the belt can meet the supports.
-    Infeasible,
-    /// The search ended without meeting the tolerance.
-    NotConverged,
+named! {
+    /// How a solve ended.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+    pub enum Status {
+        /// All residuals are within the tolerance.
+        Converged = "converged",
+        /// No shape of the belt can meet the supports.
+        Infeasible = "infeasible",
+        /// The search ended without meeting the tolerance.
+        NotConverged = "not_converged",
+    }
 }
 
 /// What a support does to the belt.
@@ -106,6 +108,11 @@ pub enum Uncertified {
         message: String,
     },
 }
+
+named!(impl Uncertified {
+    NoMultipliers = "no_multipliers",
+    NotConverged = "not_converged",
+});
 
 /// A programme and its solution.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,5 +1,6 @@
 //! What can be wrong with a scenario, as data and as one line for people.
 
+use crate::names::named;
 use thiserror::Error;
 
 /// Why a scenario is refused. Its text is one line: the field, what was found, what is allowed.
@@ -49,6 +50,13 @@ pub enum ScenarioError {
         allowed: String,
     },
 }
+
+named!(impl ScenarioError {
+    Syntax = "syntax",
+    UnknownField = "unknown_field",
+    UnknownChoice = "unknown_choice",
+    Invalid = "invalid",
+});
 
 impl ScenarioError {
     /// An [`ScenarioError::Invalid`] of these parts.

@@ -12,6 +12,7 @@ mod validate;
 
 use crate::board::material::{Laminate, Layer, Material};
 use crate::geometry::{Euler, exp, frame_from_euler};
+use crate::names::named;
 pub use crate::strip::density::EnergyModel;
 pub use parse::{LONGEST_JSON, LONGEST_TOML};
 
@@ -221,16 +222,17 @@ pub enum Component {
     Free,
 }
 
-/// A body axis.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum Axis {
-    /// The normal ξ.
-    Xi,
-    /// The tangent η.
-    Eta,
-    /// The width direction ζ.
-    Zeta,
+named! {
+    /// A body axis.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+    pub enum Axis {
+        /// The normal ξ.
+        Xi = "xi",
+        /// The tangent η.
+        Eta = "eta",
+        /// The width direction ζ.
+        Zeta = "zeta",
+    }
 }
 
 /// What holds the belt at one point of its spine.
@@ -301,15 +303,16 @@ pub struct PointLoad {
     pub lever: [f64; 3],
 }
 
-/// The method of solution.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum Method {
-    /// Bend and rib slope as the only unknowns.
-    #[default]
-    Intrinsic,
-    /// The source's own: Ritz's method with Eulerian angles, Eq. (37)–(43).
-    Ritz,
+named! {
+    /// The method of solution.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
+    pub enum Method {
+        /// Bend and rib slope as the only unknowns.
+        #[default]
+        Intrinsic = "intrinsic",
+        /// The source's own: Ritz's method with Eulerian angles, Eq. (37)–(43).
+        Ritz = "ritz",
+    }
 }
 
 /// How to solve.

@@ -1,22 +1,24 @@
 //! Bending energy of the belt per unit length of the spine: the three models, Eq. (34) and its successors.
 
+use crate::names::named;
 use crate::strip::ribs::{Across, Scaled};
 use nalgebra::{Matrix2, Vector2};
 use num_dual::DualNum;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Bending energy per unit length of the spine.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum EnergyModel {
-    /// The source's: R_f/2 · sqrt(1+β²) · κ₁², Eq. (34).
-    Fishbone,
-    /// Narrow limit of the developable plate: R_f/2 · κ₁².
-    Sadowsky,
-    /// Developable plate of finite width: R_f/2 · κ₁² · artanh(y)/y with y = sV/2.
-    #[default]
-    Wunderlich,
+named! {
+    /// Bending energy per unit length of the spine.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
+    pub enum EnergyModel {
+        /// The source's: R_f/2 · sqrt(1+β²) · κ₁², Eq. (34).
+        Fishbone = "fishbone",
+        /// Narrow limit of the developable plate: R_f/2 · κ₁².
+        Sadowsky = "sadowsky",
+        /// Developable plate of finite width: R_f/2 · κ₁² · artanh(y)/y with y = sV/2.
+        #[default]
+        Wunderlich = "wunderlich",
+    }
 }
 
 /// The bend that a belt has of itself.
@@ -40,15 +42,6 @@ pub struct Term {
 }
 
 impl EnergyModel {
-    /// Its name in scenarios and results.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Fishbone => "fishbone",
-            Self::Sadowsky => "sadowsky",
-            Self::Wunderlich => "wunderlich",
-        }
-    }
-
     /// Whether the density depends on what the board is like across the spine.
     pub fn knows_width(self) -> bool {
         self == Self::Wunderlich
