@@ -128,7 +128,7 @@ CASES = {
     "sensitivity of no solution": (
         fb.NoSensitivity,
         lambda: solved(START, TOO_FAR).sensitivity(),
-        {"reason": "not_converged"},
+        {"reason": "not_converged", "solve_message": apart},
     ),
     "sensitivity of the source's method": (
         fb.NoSensitivity,
@@ -136,15 +136,15 @@ CASES = {
         {"reason": "no_multipliers"},
     ),
     "sensitivity of no minimum": (fb.NoSensitivity, lambda: strut(90.0).sensitivity(), {"reason": "saddle"}),
-    "sensitivity of what is taut": (
+    "sensitivity without slack": (
         fb.NoSensitivity,
         lambda: solved(START, TAUT).sensitivity().jacobian(1),
-        {"reason": "taut"},
+        {"reason": "no_slack"},
     ),
-    "sensitivity of what is held twice": (
+    "sensitivity of redundant supports": (
         fb.NoSensitivity,
         lambda: stiffened().sensitivity(),
-        {"reason": "held_twice", "held_twice": "supports[1] and supports[2]"},
+        {"reason": "redundant", "redundant": "supports[1] and supports[2]"},
     ),
     "modes": (fb.NoModes, lambda: fb.solve(ritz()).modes(1), {"reason": "no_multipliers"}),
     "margin of no minimum": (fb.NoMargin, lambda: strut(90.0).snap_margin(), {"reason": "not_stable"}),

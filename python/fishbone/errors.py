@@ -53,19 +53,38 @@ class NoSupport(FishboneError, LookupError):  # noqa: N818
 class NoSensitivity(FishboneError):  # noqa: N818
     """A shape has no derivatives: it is no equilibrium, no minimum, or not determined by its supports."""
 
-    reason: Literal["no_multipliers", "not_converged", "marginal", "flat", "saddle", "redundant", "no_slack"] | None = None
+    reason: Literal["no_multipliers", "not_converged", "marginal", "flat", "saddle", "redundant", "no_slack"] | None = (
+        None
+    )
     """Why: the source's method knows no multipliers; the solve has not converged; the belt moves at no cost of energy;
     a part of it is flat under load; the energy is no minimum; supports hold the same twice over, or leave no slack."""
     redundant: str | None = None
     """The supports and links that hold the same twice over."""
+    solve_message: str | None = None
+    """What the solve said that has not converged."""
 
 
 class NoMargin(FishboneError):  # noqa: N818
     """A shape has no stability to lose, or nothing that could be moved."""
 
-    reason: Literal["no_multipliers", "not_converged", "singular", "not_stable", "not_clamped", "lost"] | None = None
+    reason: (
+        Literal[
+            "no_multipliers",
+            "not_converged",
+            "singular",
+            "not_stable",
+            "not_clamped",
+            "lost",
+            "no_number",
+            "nothing",
+            "no_pose",
+            "invalid",
+            "unreadable",
+        ]
+        | None
+    ) = None
     """Why: there is nothing to follow, as of `NoBranch`; it is not stable; the support holds no whole pose; or it could
-    be followed only a part of the way."""
+    be followed only a part of the way; the last five as of `NoPath`."""
     support: int | None = None
     """Index of the support that holds no whole pose."""
     share: float | None = None
@@ -79,6 +98,8 @@ class NoModes(FishboneError):  # noqa: N818
 
     reason: Literal["no_multipliers", "not_converged", "singular"] | None = None
     """Why: the source's method knows no multipliers; the solve has not converged; the second variation is singular."""
+    solve_message: str | None = None
+    """What the solve said that has not converged."""
 
 
 class NoTracker(FishboneError):  # noqa: N818
@@ -96,9 +117,10 @@ class NoTracker(FishboneError):  # noqa: N818
 class NoPath(FishboneError, ValueError):  # noqa: N818
     """A scenario does not lead along the path that was asked for."""
 
-    reason: Literal["no_number", "nothing", "not_clamped", "invalid", "unreadable"] | None = None
-    """Why: the scenario gives no such number; nothing changes; the support holds no whole pose; the scenario at the end
-    of the path is not valid, or a number there is not of the kind that its field takes."""
+    reason: Literal["no_number", "nothing", "not_clamped", "no_pose", "invalid", "unreadable"] | None = None
+    """Why: the scenario gives no such number; nothing changes; the support holds no whole pose, or may not be held at one
+    of the poses; the scenario at the end of the path is not valid, or a number there is not of the kind that its field
+    takes."""
     field: str | None = None
     """Path of the field that gives no number, or that is not valid at the end."""
     found: str | None = None
