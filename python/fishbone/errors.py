@@ -118,9 +118,9 @@ class NoPath(FishboneError, ValueError):  # noqa: N818
     """A scenario does not lead along the path that was asked for."""
 
     reason: Literal["no_number", "nothing", "not_clamped", "no_pose", "invalid", "unreadable"] | None = None
-    """Why: the scenario gives no such number; nothing changes; the support holds no whole pose, or may not be held at one
-    of the poses; the scenario at the end of the path is not valid, or a number there is not of the kind that its field
-    takes."""
+    """Why: the scenario gives no such number; nothing changes; the support holds no whole pose, or may not be held at
+    one of the poses; the scenario at the end of the path is not valid, or a number there is not of the kind that its
+    field takes."""
     field: str | None = None
     """Path of the field that gives no number, or that is not valid at the end."""
     found: str | None = None
