@@ -10,7 +10,7 @@ use fishbone::equilibrium::Status;
 use fishbone::names::Named;
 use fishbone::scenario::error::ScenarioError;
 use fishbone::scenario::{Axis, Method};
-use fishbone::strip::density::EnergyModel;
+use fishbone::strip::developable::EnergyModel;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 

@@ -59,7 +59,7 @@ mod tests {
     use crate::analysis::path::Motion;
     use crate::equilibrium::Status;
     use crate::scenario::{Axis, Method};
-    use crate::strip::density::EnergyModel;
+    use crate::strip::developable::EnergyModel;
     use serde::Serialize;
 
     /// All names are told apart, and serde knows each by the same.

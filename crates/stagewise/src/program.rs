@@ -294,6 +294,15 @@ impl<const X: usize, const U: usize, const N: usize> Linearisation<X, U, N> {
         }
     }
 
+    /// Turns a gradient by states and controls of all nodes into that by the unknowns: states beyond the first, which
+    /// inequalities of nodes and pairs have, are carried back, and controls that follow others are folded onto these.
+    pub(crate) fn gather_gradient(&self, gradient: &mut [NodeVector<N>]) {
+        if self.layout.inequalities() > self.layout.inequalities_at_stages() {
+            self.chain.carry_back(gradient);
+        }
+        self.chain.fold(gradient);
+    }
+
     /// Adds to a gradient the slacks' gradients, each times a factor of its row.
     pub(crate) fn add_slack_gradients(
         &self,

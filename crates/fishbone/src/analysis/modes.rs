@@ -3,7 +3,7 @@
 use crate::analysis::sensitivity::Motion;
 use crate::equilibrium::{Equilibrium, Uncertified};
 use crate::names::named;
-use crate::problem::program::NodeVector;
+use crate::problem::program::DevelopableNode as NodeVector;
 use stagewise::Singular;
 use thiserror::Error;
 

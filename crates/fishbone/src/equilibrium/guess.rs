@@ -535,7 +535,7 @@ fn place(point: &mut BeltPoint, start: Option<&NodeSupport>, end: Option<&NodeSu
 mod tests {
     use super::*;
     use crate::problem::program::Hold;
-    use crate::strip::density::{Curl, EnergyModel};
+    use crate::strip::developable::{Curl, EnergyModel};
     use crate::strip::element::Element;
     use crate::strip::ribs::FURTHER;
 

@@ -3,7 +3,7 @@
 use crate::equilibrium::guess::{buckle, disturb, guess, inside, is_flat, ring};
 use crate::problem::program::{BeltPoint, BeltProgram, Piece};
 use crate::scenario::SAME_PLACE;
-use crate::strip::density::EnergyModel;
+use crate::strip::developable::EnergyModel;
 use nalgebra::{Vector2, Vector3};
 use stagewise::{Outcome, Program, Settings, Solution};
 use std::f64::consts::PI;

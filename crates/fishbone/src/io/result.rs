@@ -3,7 +3,7 @@
 use crate::equilibrium::{Equilibrium, LinkForce, Status};
 use crate::geometry::Wrench;
 use crate::scenario::Scenario;
-use crate::strip::density::EnergyModel;
+use crate::strip::developable::EnergyModel;
 use crate::surface;
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;

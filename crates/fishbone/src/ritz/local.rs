@@ -2,7 +2,7 @@
 
 use super::Orientation;
 use super::basis::LOCALS;
-use crate::strip::density::{Curl, EnergyModel};
+use crate::strip::developable::{Curl, EnergyModel};
 use crate::strip::ribs::Across;
 use nalgebra::{Matrix3, SVector};
 use num_dual::DualNum;

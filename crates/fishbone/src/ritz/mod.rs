@@ -19,7 +19,7 @@ mod lagrangian;
 mod local;
 mod newton;
 
-use crate::strip::density::EnergyModel;
+use crate::strip::developable::EnergyModel;
 use basis::{FIELDS, localiser, quadrature};
 use lagrangian::Lagrangian;
 use local::Local;

@@ -13,7 +13,7 @@ mod validate;
 use crate::board::material::{Laminate, Layer, Material};
 use crate::geometry::{Euler, exp, frame_from_euler};
 use crate::names::named;
-pub use crate::strip::density::EnergyModel;
+pub use crate::strip::developable::EnergyModel;
 pub use parse::{LONGEST_JSON, LONGEST_TOML};
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};

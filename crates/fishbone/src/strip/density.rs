@@ -1,251 +1,134 @@
-//! Bending energy of the belt per unit length of the spine: the three models, Eq. (34) and its successors.
+//! What an energy of the bent belt is to the programme: a density per unit length of the spine, with its derivatives.
+//!
+//! A density is a function of fields along the spine and of their rates. The first two fields are the bend ω_ζ and the rib
+//! slope β; a density may have more. Fields are linear within an element. The pose increment and the energy are both taken
+//! at the element's two Gauss points.
 
-use crate::names::named;
-use crate::strip::ribs::{Across, Scaled};
-use nalgebra::{Matrix2, Vector2};
+use crate::geometry::{Pose, gauss_points};
+use crate::strip::developable::Curl;
+use crate::strip::element::Element;
+use nalgebra::{SVector, Vector6};
 use num_dual::DualNum;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use stagewise::{Stage, StageMatrix};
 
-named! {
-    /// Bending energy per unit length of the spine.
-    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
-    pub enum EnergyModel {
-        /// The source's: R_f/2 · sqrt(1+β²) · κ₁², Eq. (34).
-        Fishbone = "fishbone",
-        /// Narrow limit of the developable plate: R_f/2 · κ₁².
-        Sadowsky = "sadowsky",
-        /// Developable plate of finite width: R_f/2 · κ₁² · artanh(y)/y with y = sV/2.
-        #[default]
-        Wunderlich = "wunderlich",
-    }
+/// Elements whose motions and derivatives are found at a time.
+pub const LANES: usize = 8;
+
+/// A place of the belt at which a density is asked for.
+#[derive(Debug, Clone, Copy)]
+pub struct Section<'a, T, const F: usize> {
+    /// Fields at the place, of which the first two are bend and rib slope.
+    pub fields: [T; F],
+    /// Their derivatives by u.
+    pub rates: [T; F],
+    /// Fields at both ends of the element.
+    pub ends: [[T; F]; 2],
+    /// The element: its length, in-plane curvature, half width.
+    pub element: &'a Element,
 }
 
-/// The bend that a belt has of itself.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Curl<W = f64> {
-    /// Natural bend k, the ω_ζ of the unloaded belt.
-    pub bend: W,
-    /// Poisson's ratio ν, which says what bending along the curl does across it.
-    pub poisson: f64,
-}
+/// Energy of the bent belt per unit length of the spine at unit rigidity, by `F` fields along it.
+pub trait Density<const F: usize>: Clone {
+    /// Motions of elements, several at a time; [`crate::strip::automatic::Motions`] unless a kernel is faster.
+    type Motions: Motions<Self, F>;
+    /// Derivatives of elements, several at a time; [`crate::strip::automatic::Derivatives`] unless a kernel is faster.
+    type Derivatives: Derivatives<Self, F>;
 
-/// A term of the density with its first and second derivatives by (bend, slope).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Term {
-    /// Value.
-    pub value: f64,
-    /// Gradient.
-    pub gradient: Vector2<f64>,
-    /// Hessian.
-    pub hessian: Matrix2<f64>,
-}
+    /// The density. The numbers may carry derivatives.
+    fn value<T: DualNum<Primitive = f64> + Copy>(&self, section: &Section<'_, T, F>) -> T;
 
-impl EnergyModel {
-    /// Whether the density depends on what the board is like across the spine.
-    pub fn knows_width(self) -> bool {
-        self == Self::Wunderlich
-    }
-
-    /// Energy per unit length at unit rigidity; the numbers may carry derivatives.
+    /// Torsion ω_η and bend ω_ζ of the spine: its frame turns by (κ_g, ω_η, ω_ζ) per unit length. Unless a density says
+    /// otherwise the ribs are exact, ω_η = −β ω_ζ.
     ///
-    /// With the natural bend k it is that of a plate whose unloaded state is a cylinder: the bracket
-    /// κ₁² − 2k ω_ζ (1 + ν β²) + k², each term times what the width makes of it. The source's model has no plate behind
-    /// it and takes the bracket times sqrt(1+β²).
-    ///
-    /// Source: Eq. (29), (34), in β: written in ω_η/ω_ζ it is singular where the belt is not bent.
-    pub fn value<W: DualNum<Primitive = f64> + Copy, D: Scaled<W>>(
-        self,
-        bend: D,
-        slope: D,
-        curl: &Curl<W>,
-        across: &Across<D>,
-    ) -> D {
-        let across = match self.knows_width() {
-            true => *across,
-            false => Across::PLAIN.map(D::from),
-        };
-        let square = slope * slope;
-        let stretch = square + 1.0;
-        let factor = match self {
-            Self::Fishbone => stretch.sqrt(),
-            Self::Sadowsky | Self::Wunderlich => D::one(),
-        };
-        let bent = bend * bend * stretch * stretch * across.bending;
-        let mixed = bend * (square * curl.poisson + 1.0) * across.length * (curl.bend * -2.0);
-        let natural = across.area * curl.bend.powi(2);
-        (bent + mixed + natural) * factor * 0.5
+    /// Source: Eq. (32)
+    fn torsion_and_bend<T: DualNum<Primitive = f64> + Copy>(&self, fields: &[T; F]) -> [T; 2] {
+        [-fields[1] * fields[0], fields[0]]
     }
 
-    /// The term in κ₁² at unit rigidity, before the width's factor.
-    #[inline(always)]
-    pub fn bending(self, bend: f64, slope: f64) -> Term {
-        let c = self.slope_factor(slope);
-        let half = 0.5 * bend * bend;
-        Term {
-            value: half * c[0],
-            gradient: Vector2::new(bend * c[0], half * c[1]),
-            hessian: Matrix2::new(c[0], bend * c[1], bend * c[1], half * c[2]),
-        }
-    }
-
-    /// The term linear in the bend, −k ω_ζ (1 + ν β²), before the width's factor.
-    pub fn mixed(self, bend: f64, slope: f64, curl: &Curl) -> Term {
-        let [f, f1, f2] = self.stretch_factor(slope);
-        let (nu, k) = (curl.poisson, -curl.bend);
-        let q = 1.0 + nu * slope * slope;
-        let by = q * f1 + 2.0 * nu * slope * f;
-        let second = q * f2 + 4.0 * nu * slope * f1 + 2.0 * nu * f;
-        Term {
-            value: k * bend * q * f,
-            gradient: Vector2::new(k * q * f, k * bend * by),
-            hessian: Matrix2::new(0.0, k * by, k * by, k * bend * second),
-        }
-    }
-
-    /// The term of the natural bend alone, k²/2, before the width's factor.
-    pub fn natural(self, slope: f64, curl: &Curl) -> Term {
-        let [f, f1, f2] = self.stretch_factor(slope);
-        let half = 0.5 * curl.bend * curl.bend;
-        Term {
-            value: half * f,
-            gradient: Vector2::new(0.0, half * f1),
-            hessian: Matrix2::new(0.0, 0.0, 0.0, half * f2),
-        }
-    }
-
-    /// The source's factor 1/cos α = sqrt(1+β²) and its first two derivatives by β; 1 in the plate models.
-    fn stretch_factor(self, slope: f64) -> [f64; 3] {
-        match self {
-            Self::Fishbone => {
-                let root = 1f64.hypot(slope);
-                [root, slope / root, 1.0 / (root * root * root)]
-            }
-            Self::Sadowsky | Self::Wunderlich => [1.0, 0.0, 0.0],
-        }
-    }
-
-    /// Power of 1+β² in the term in κ₁².
-    #[inline(always)]
-    fn exponent(self) -> f64 {
-        match self {
-            Self::Fishbone => 2.5,
-            Self::Sadowsky | Self::Wunderlich => 2.0,
-        }
-    }
-
-    /// (1+β²)^p and its first two derivatives by β.
-    #[inline(always)]
-    fn slope_factor(self, slope: f64) -> [f64; 3] {
-        let p = self.exponent();
-        let t = 1.0 + slope * slope;
-        let lowest = match self {
-            Self::Fishbone => t.sqrt(),
-            Self::Sadowsky | Self::Wunderlich => 1.0,
-        };
-        [
-            lowest * t * t,
-            2.0 * p * slope * lowest * t,
-            2.0 * p * lowest * (t + 2.0 * (p - 1.0) * slope * slope),
-        ]
+    /// Energy of an element, from its fields at both ends.
+    fn energy(&self, element: &Element, ends: [&SVector<f64, F>; 2]) -> f64 {
+        element_energy(self, element, ends.map(|end| end.data.0[0]))
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use num_dual::{Dual2SVec64, hessian};
+/// An element in its place: what its derivatives depend on.
+#[derive(Debug, Clone, Copy)]
+pub struct Loaded<'a, const F: usize> {
+    /// The element.
+    pub element: &'a Element,
+    /// Fields at both ends.
+    pub fields: [&'a SVector<f64, F>; 2],
+    /// Poses of both nodes.
+    pub poses: [&'a Pose; 2],
+    /// Derivative of all work by a twist of the belt from the second node on: force, then moment about the origin, world axes.
+    pub wrench: &'a Vector6<f64>,
+}
 
-    const MODELS: [EnergyModel; 3] = [
-        EnergyModel::Fishbone,
-        EnergyModel::Sadowsky,
-        EnergyModel::Wunderlich,
-    ];
+/// The motions along up to [`LANES`] elements.
+pub trait Motions<D, const F: usize>: Default {
+    /// Puts an element into a lane, with its fields at both ends.
+    fn set(&mut self, lane: usize, element: &Element, ends: [&SVector<f64, F>; 2]);
 
-    #[test]
-    fn test_terms_agree_with_automatic_differentiation_of_the_whole() {
-        let curl = Curl {
-            bend: 1.7,
-            poisson: 0.34,
+    /// Finds the motions of all lanes: fourth-order Magnus steps.
+    fn find(&mut self, density: &D);
+
+    /// The motion of a lane.
+    fn at(&self, lane: usize) -> Pose;
+}
+
+/// The derivatives of up to [`LANES`] elements.
+pub trait Derivatives<D, const F: usize>: Default {
+    /// Puts an element into a lane.
+    fn set(&mut self, lane: usize, density: &D, loaded: &Loaded<'_, F>);
+
+    /// Finds the derivatives of all lanes.
+    fn find(&mut self, density: &D);
+
+    /// Gradient of energy and work by the fields at both ends of a lane's element.
+    fn gradient(&self, lane: usize) -> [SVector<f64, F>; 2];
+
+    /// Their second derivatives.
+    fn hessian(&self, lane: usize) -> StageMatrix<F>;
+
+    /// Writes how the element of a lane carries the twist on, and second derivatives by that twist and the fields.
+    fn carry<const N: usize>(&self, lane: usize, stage: &mut Stage<F, N>);
+}
+
+/// Energy of an element by its definition: the density at the two Gauss points.
+pub(super) fn element_energy<D, T, const F: usize>(
+    density: &D,
+    element: &Element,
+    ends: [[T; F]; 2],
+) -> T
+where
+    D: Density<F>,
+    T: DualNum<Primitive = f64> + Copy,
+{
+    let rates = std::array::from_fn(|i| (ends[1][i] - ends[0][i]) / element.length);
+    let at = |t: f64, rigidity: f64| {
+        let section = Section {
+            fields: between(&ends, t),
+            rates,
+            ends,
+            element,
         };
-        for model in MODELS {
-            for at in [
-                Vector2::new(3.0, -0.8),
-                Vector2::new(-1.2, 2.5),
-                Vector2::zeros(),
-            ] {
-                let across = match model.knows_width() {
-                    true => Across {
-                        bending: 1.3,
-                        length: 0.9,
-                        area: 0.7,
-                    },
-                    false => Across::PLAIN,
-                };
-                let value = |x: Vector2<Dual2SVec64<2>>| {
-                    model.value(x[0], x[1], &curl, &across.map(Dual2SVec64::from))
-                };
-                let (value, gradient, second) = hessian(value, &at);
-                let terms = [
-                    (model.bending(at.x, at.y), across.bending),
-                    (model.mixed(at.x, at.y, &curl), across.length),
-                    (model.natural(at.y, &curl), across.area),
-                ];
-                let sum = |part: fn(&Term) -> f64| -> f64 {
-                    terms.iter().map(|(term, factor)| factor * part(term)).sum()
-                };
-                assert!((sum(|t| t.value) - value).abs() <= 1e-13 * value.abs());
-                assert!((sum(|t| t.gradient.x) - gradient.x).abs() <= 1e-12 * gradient.amax());
-                assert!((sum(|t| t.gradient.y) - gradient.y).abs() <= 1e-12 * gradient.amax());
-                for (i, j) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-                    let by_hand: f64 = terms.iter().map(|(t, f)| f * t.hessian[(i, j)]).sum();
-                    assert!((by_hand - second[(i, j)]).abs() <= 1e-12 * second.amax());
-                }
-            }
-        }
-    }
+        density.value(&section) * (0.5 * element.length * rigidity)
+    };
+    let [first, second] = gauss_points();
+    at(first, element.rigidity[0]) + at(second, element.rigidity[1])
+}
 
-    fn density(model: EnergyModel, bend: f64, slope: f64, curl: &Curl) -> f64 {
-        model.value(bend, slope, curl, &Across::PLAIN)
-    }
+/// The fields at parameter t of an element.
+pub(super) fn between<T, const F: usize>(ends: &[[T; F]; 2], t: f64) -> [T; F]
+where
+    T: DualNum<Primitive = f64> + Copy,
+{
+    std::array::from_fn(|i| ends[0][i] * (1.0 - t) + ends[1][i] * t)
+}
 
-    #[test]
-    fn test_on_a_cylinder_plate_theory_gives_half_the_squared_curvature() {
-        let (angle, radius) = (0.6f64, 0.3);
-        let (bend, slope) = (angle.cos().powi(2) / radius, angle.tan());
-        let plate = 0.5 / radius.powi(2);
-        let at = |model| density(model, bend, slope, &Curl::default());
-        assert!((at(EnergyModel::Sadowsky) - plate).abs() < 1e-13);
-        assert!((at(EnergyModel::Wunderlich) - plate).abs() < 1e-13);
-        assert!((at(EnergyModel::Fishbone) - plate / angle.cos()).abs() < 1e-13);
-    }
-
-    #[test]
-    fn test_curled_plate_on_a_cylinder_is_an_isotropic_plate() {
-        // Bending less natural bending, K = diag(κ cos² a − k, κ sin² a; κ sin a cos a): the energy of a plate is
-        // ½ [ (tr K)² − 2(1 − ν) det K ], less the part of k that no shape of the belt changes.
-        let (a, radius, k, nu) = (0.6f64, 0.3, 2.0, 0.34);
-        let (bend, slope) = (a.cos().powi(2) / radius, a.tan());
-        let along = a.cos().powi(2) / radius - k;
-        let across = a.sin().powi(2) / radius;
-        let shear = a.sin() * a.cos() / radius;
-        let plate =
-            0.5 * ((along + across).powi(2) - 2.0 * (1.0 - nu) * (along * across - shear * shear));
-        let curl = Curl {
-            bend: k,
-            poisson: nu,
-        };
-        assert!((density(EnergyModel::Sadowsky, bend, slope, &curl) - plate).abs() < 1e-12);
-    }
-
-    #[test]
-    fn test_curled_belt_at_rest_has_no_energy() {
-        let curl = Curl {
-            bend: -4.0,
-            poisson: 0.3,
-        };
-        for model in MODELS {
-            assert_eq!(density(model, -4.0, 0.0, &curl), 0.0);
-        }
+impl<T: DualNum<Primitive = f64> + Copy, const F: usize> Section<'_, T, F> {
+    /// Natural bend of the element.
+    pub fn curl(&self) -> &Curl {
+        &self.element.curl
     }
 }

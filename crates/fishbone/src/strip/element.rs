@@ -4,7 +4,7 @@
 //! and energy taken at different points, a node-to-node zigzag of the unknowns would cost one of them nothing.
 
 use crate::geometry::{Pose, Twist, gauss_points, magnus};
-use crate::strip::density::{Curl, EnergyModel, Term};
+use crate::strip::developable::{Curl, EnergyModel, Term};
 use crate::strip::ribs::{Across, BOUNDS, Edge, FURTHER, SlopeJet, Strips};
 use nalgebra::{Matrix2, Matrix2x4, Matrix4, Vector3, Vector4};
 
@@ -141,6 +141,18 @@ impl GaussFields {
 }
 
 impl Element {
+    /// An element of a straight board of rigidity 1.
+    pub fn straight(length: f64, half_width: f64, curl: Curl) -> Self {
+        Self {
+            length,
+            geodesic: 0.0,
+            rigidity: [1.0; 2],
+            half_width,
+            curl,
+            further: [None; FURTHER],
+        }
+    }
+
     /// The strips between its ribs.
     pub fn strips(&self) -> Strips {
         Strips {
@@ -228,12 +240,13 @@ fn fields_by_nodes(t: f64) -> Matrix2x4<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::strip::kernel::{Block, LANES, Motions};
+    use crate::strip::density::{Derivatives, LANES, Loaded, Motions as _};
+    use crate::strip::kernel::{Block, Motions};
     use stagewise::Stage;
 
     type NodeVector = stagewise::NodeVector<8>;
     type ByControls = stagewise::ByControls<2, 8>;
-    use nalgebra::{Matrix3, SMatrix, SVector};
+    use nalgebra::{Matrix3, SMatrix, SVector, Vector2};
     use num_dual::{DualNum, hessian};
 
     /// The element over again in any scalar: truncated exponential series instead of closed forms.
@@ -404,8 +417,9 @@ mod tests {
                 [w[0], w[1], w[2], w[3]],
             );
             let mut motions = Motions::default();
-            motions.set(3, &element, &w);
-            motions.find();
+            let [a, b] = ends(&w);
+            motions.set(3, &element, [&a, &b]);
+            motions.find(&EnergyModel::Wunderlich);
             for motion in [motion, motions.at(3)] {
                 assert_close(motion.position, Vector3::from(p), 1e-14);
                 assert_close(motion.frame, Matrix3::from_fn(|i, j| e[i][j]), 1e-14);
@@ -425,16 +439,26 @@ mod tests {
             for some in cases().chunks(LANES) {
                 let mut block = Block::default();
                 for (lane, (element, w)) in some.iter().enumerate() {
-                    let across = element.across_jets(model, w).bending;
                     let second = first * element.increment(w);
-                    block.set(lane, element, w, &across, [&first, &second], &wrench);
+                    let [a, b] = ends(w);
+                    let loaded = Loaded {
+                        element,
+                        fields: [&a, &b],
+                        poses: [&first, &second],
+                        wrench: &wrench.fixed_rows::<6>(0).into_owned(),
+                    };
+                    block.set(lane, &model, &loaded);
                 }
-                block.differentiate(model);
+                block.find(&model);
                 for (lane, (element, w)) in some.iter().enumerate() {
                     check_lane(&block, lane, element, w, model, &first, &wrench);
                 }
             }
         }
+    }
+
+    fn ends(w: &Vector4<f64>) -> [Vector2<f64>; 2] {
+        [0, 2].map(|from| w.fixed_rows::<2>(from).into_owned())
     }
 
     fn check_lane(
@@ -451,19 +475,31 @@ mod tests {
         let about_first = wrench.fixed_rows::<3>(3) - first.position.cross(&force);
         let (force_here, moment_here) =
             (first.frame.tr_mul(&force), first.frame.tr_mul(&about_first));
-        let unloaded = Element {
-            curl: Curl::default(),
-            ..*element
-        };
         let (_, gradient, second) = hessian(
             |x: SVector<num_dual::Dual2SVec64<4>, 4>| {
                 let x = [x[0], x[1], x[2], x[3]];
-                work(element, x, &motion, &force_here, &moment_here) + energy(&unloaded, model, x)
+                work(element, x, &motion, &force_here, &moment_here) + energy(element, model, x)
             },
             w,
         );
-        assert_close(block.gradient(lane), gradient, 1e-11);
-        assert_close(block.hessian(lane), second, 1e-10);
+        let [a, b] = block.gradient(lane);
+        assert_close(Vector4::new(a[0], a[1], b[0], b[1]), gradient, 1e-11);
+        let own = block.hessian(lane);
+        assert_close(
+            own.first,
+            second.fixed_view::<2, 2>(0, 0).into_owned(),
+            1e-10,
+        );
+        assert_close(
+            own.mixed,
+            second.fixed_view::<2, 2>(0, 2).into_owned(),
+            1e-10,
+        );
+        assert_close(
+            own.second,
+            second.fixed_view::<2, 2>(2, 2).into_owned(),
+            1e-10,
+        );
         let mut stage = Stage::zero();
         block.carry(lane, &mut stage);
         for i in 0..3 {

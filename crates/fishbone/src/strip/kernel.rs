@@ -6,15 +6,12 @@
 //! between two points where something acts.
 
 use crate::geometry::{Coefficients, Pose, gauss_points};
-use crate::strip::density::{EnergyModel, Term};
-use crate::strip::element::Element;
-use crate::strip::ribs::SlopeJet;
+use crate::strip::density::{self, LANES, Loaded};
+use crate::strip::developable::{EnergyModel, Term};
+use crate::strip::element::{Element, Jet};
 use multiversion::multiversion;
-use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
-use stagewise::{NodeVector, Stage};
-
-/// Elements in a block.
-pub const LANES: usize = 8;
+use nalgebra::{Matrix3, SMatrix, SVector, Vector2, Vector3, Vector4};
+use stagewise::{Stage, StageMatrix};
 
 /// One number for every element of a block.
 type Lanes = [f64; LANES];
@@ -66,6 +63,8 @@ struct Output {
 pub struct Block {
     input: Input,
     output: Output,
+    /// What the natural bend adds, where an element has one.
+    curl: [Option<Jet>; LANES],
 }
 
 const NOTHING: Lanes = [0.0; LANES];
@@ -106,19 +105,17 @@ impl Default for Motions {
     }
 }
 
-impl Motions {
-    /// Puts an element into a lane.
-    pub fn set(&mut self, lane: usize, element: &Element, fields: &Vector4<f64>) {
-        self.spans.set(lane, element, fields);
+impl density::Motions<EnergyModel, 2> for Motions {
+    fn set(&mut self, lane: usize, element: &Element, [a, b]: [&Vector2<f64>; 2]) {
+        let fields = Vector4::new(a[0], a[1], b[0], b[1]);
+        self.spans.set(lane, element, &fields);
     }
 
-    /// Finds the motions of all lanes: the fourth-order Magnus step of [`Element::increment`].
-    pub fn find(&mut self) {
+    fn find(&mut self, _: &EnergyModel) {
         find_motions(&self.spans, &mut self.frame, &mut self.position);
     }
 
-    /// The motion of a lane.
-    pub fn at(&self, lane: usize) -> Pose {
+    fn at(&self, lane: usize) -> Pose {
         let [x, y, z] = triple(&self.position, 0, lane);
         Pose {
             frame: Matrix3::from_iterator(self.frame.iter().map(|entry| entry[lane])),
@@ -146,34 +143,36 @@ impl Default for Block {
                 gradient: [NOTHING; 4],
                 hessian: [NOTHING; 10],
             },
+            curl: [None; LANES],
         }
     }
 }
 
-impl Block {
-    /// Puts an element, between two poses and under the wrench at its second node, into a lane.
-    pub fn set(
-        &mut self,
-        lane: usize,
-        element: &Element,
-        fields: &Vector4<f64>,
-        across: &SlopeJet,
-        poses: [&Pose; 2],
-        wrench: &NodeVector<8>,
-    ) {
+impl density::Derivatives<EnergyModel, 2> for Block {
+    fn set(&mut self, lane: usize, model: &EnergyModel, loaded: &Loaded<'_, 2>) {
+        let Loaded {
+            element,
+            fields: [a, b],
+            poses: [first, second],
+            wrench,
+        } = loaded;
+        let fields = Vector4::new(a[0], a[1], b[0], b[1]);
+        let across = element.across_jets(*model, &fields);
+        self.curl[lane] =
+            (element.curl.bend != 0.0).then(|| element.curl_jet(*model, &fields, &across));
         let into = &mut self.input;
-        let [first, second] = poses;
         let put = |lanes: &mut [Lanes], values: &[f64]| {
             for (lanes, value) in lanes.iter_mut().zip(values) {
                 lanes[lane] = *value;
             }
         };
-        into.spans.set(lane, element, fields);
+        into.spans.set(lane, element, &fields);
         put(&mut into.rigidity, &element.rigidity);
         put(&mut into.frame, first.frame.as_slice());
         put(&mut into.position, first.position.as_slice());
         put(&mut into.next, second.position.as_slice());
         put(&mut into.wrench, wrench.as_slice());
+        let across = &across.bending;
         let (gradient, hessian) = (&across.gradient, &across.hessian);
         put(&mut into.across, &[across.value, gradient[0], gradient[1]]);
         put(
@@ -182,8 +181,7 @@ impl Block {
         );
     }
 
-    /// Finds the derivatives of all lanes.
-    pub fn differentiate(&mut self, model: EnergyModel) {
+    fn find(&mut self, model: &EnergyModel) {
         match model {
             EnergyModel::Fishbone => differentiate::<true>(&self.input, &mut self.output),
             EnergyModel::Sadowsky | EnergyModel::Wunderlich => {
@@ -192,21 +190,32 @@ impl Block {
         }
     }
 
-    /// Gradient of bending energy and work by the fields of a lane.
-    pub fn gradient(&self, lane: usize) -> Vector4<f64> {
+    fn gradient(&self, lane: usize) -> [SVector<f64, 2>; 2] {
         let [a, b, c, d] = &self.output.gradient;
-        Vector4::new(a[lane], b[lane], c[lane], d[lane])
+        let mut gradient = Vector4::new(a[lane], b[lane], c[lane], d[lane]);
+        if let Some(curl) = &self.curl[lane] {
+            gradient += curl.gradient;
+        }
+        [0, 2].map(|from| gradient.fixed_rows::<2>(from).into_owned())
     }
 
-    /// Their Hessian.
-    pub fn hessian(&self, lane: usize) -> Matrix4<f64> {
+    fn hessian(&self, lane: usize) -> StageMatrix<2> {
         let [a, b, c, d, e, f, g, h, i, j] =
             self.output.hessian.each_ref().map(|entry| entry[lane]);
-        Matrix4::new(a, b, c, d, b, e, f, g, c, f, h, i, d, g, i, j)
+        let mut hessian = StageMatrix {
+            first: SMatrix::<f64, 2, 2>::new(a, b, b, e),
+            mixed: SMatrix::<f64, 2, 2>::new(c, d, f, g),
+            second: SMatrix::<f64, 2, 2>::new(h, i, i, j),
+        };
+        if let Some(curl) = &self.curl[lane] {
+            hessian.first += curl.hessian.fixed_view::<2, 2>(0, 0);
+            hessian.mixed += curl.hessian.fixed_view::<2, 2>(0, 2);
+            hessian.second += curl.hessian.fixed_view::<2, 2>(2, 2);
+        }
+        hessian
     }
 
-    /// How the element of a lane carries the twist on.
-    pub fn carry(&self, lane: usize, stage: &mut Stage<2, 8>) {
+    fn carry<const N: usize>(&self, lane: usize, stage: &mut Stage<2, N>) {
         let Output { growth, mixed, .. } = &self.output;
         for (column, (growth, mixed)) in growth.iter().zip(mixed).enumerate() {
             let [into_growth, into_mixed] = match column {

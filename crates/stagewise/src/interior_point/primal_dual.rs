@@ -95,7 +95,7 @@ impl<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> Primal
         let multipliers = &self.multipliers.inequalities;
         let linear = &self.kkt.linear;
         linear.add_slack_gradients(|row| -multipliers[row], &mut self.gradient);
-        linear.chain.fold(&mut self.gradient);
+        linear.gather_gradient(&mut self.gradient);
         largest_entry(&self.gradient)
     }
 

@@ -132,7 +132,7 @@ impl<const X: usize, const U: usize, const N: usize> Response<X, U, N> {
                 *missed = self.values.slacks[row] - barrier * weights[row] / multipliers[row];
             }
         }
-        self.linear().chain.fold(&mut missed.nodes);
+        self.linear().gather_gradient(&mut missed.nodes);
         missed
     }
 

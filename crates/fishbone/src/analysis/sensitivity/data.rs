@@ -1,7 +1,7 @@
 //! What an element is made of, and how its energy and its bounds depend on that.
 
 use crate::geometry::gauss_points;
-use crate::strip::density::{Curl, EnergyModel};
+use crate::strip::developable::{Curl, EnergyModel};
 use crate::strip::element::Element;
 use crate::strip::ribs::{Across, Edge, Strips};
 use nalgebra::{Matrix4, SVector, Vector2, Vector4};
@@ -134,9 +134,10 @@ mod tests {
     use crate::board::reach::further_edges;
     use crate::board::samples::{Part, Plan};
     use crate::geometry::Pose;
-    use crate::problem::program::NodeVector;
+    use crate::strip::density::{Derivatives, Loaded};
     use crate::strip::kernel::Block;
     use crate::strip::ribs::FURTHER;
+    use nalgebra::Vector6;
     use num_dual::Dual64;
 
     fn element(further: [Option<Edge>; FURTHER]) -> Element {
@@ -155,22 +156,20 @@ mod tests {
 
     /// Energy and its gradient by the fields.
     fn energy(element: &Element, model: EnergyModel, fields: &Vector4<f64>) -> (f64, Vector4<f64>) {
-        let across = element.across_jets(model, fields);
+        let [a, b] = [0, 2].map(|from| fields.fixed_rows::<2>(from).into_owned());
         let mut block = Block::default();
-        let poses = [&Pose::identity(), &element.increment(fields)];
-        block.set(
-            0,
+        let loaded = Loaded {
             element,
-            fields,
-            &across.bending,
-            poses,
-            &NodeVector::zeros(),
-        );
-        block.differentiate(model);
-        let curl = element.curl_jet(model, fields, &across);
+            fields: [&a, &b],
+            poses: [&Pose::identity(), &element.increment(fields)],
+            wrench: &Vector6::zeros(),
+        };
+        block.set(0, &model, &loaded);
+        block.find(&model);
+        let [a, b] = block.gradient(0);
         (
             element.energy(model, fields),
-            block.gradient(0) + curl.gradient,
+            Vector4::new(a[0], a[1], b[0], b[1]),
         )
     }
 

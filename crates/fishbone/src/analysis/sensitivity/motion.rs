@@ -3,7 +3,7 @@
 
 use super::Motion;
 use crate::geometry::Pose;
-use crate::problem::program::NodeVector;
+use crate::problem::program::DevelopableNode as NodeVector;
 use nalgebra::Vector3;
 
 /// The motion of a node along the step of its state, a twist about the programme's origin.

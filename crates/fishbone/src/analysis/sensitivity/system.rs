@@ -5,7 +5,8 @@ use super::data::{ByData, Data, HALF_WIDTH};
 use super::motion::{add_pull, motion};
 use crate::equilibrium::Solved;
 use crate::problem::program::{
-    BeltPoint, BeltProgram, NodeSupport, NodeVector, Piece, ROWS, Rows, Turn, rows_of, weight,
+    BeltPoint, BeltProgram, DevelopableNode as NodeVector, NodeSupport, Piece, ROWS, Rows, Turn,
+    rows_of, weight,
 };
 use nalgebra::{Vector3, Vector4};
 use stagewise::{Direction as Step, Program};

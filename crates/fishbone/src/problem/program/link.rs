@@ -1,9 +1,9 @@
 //! What ties two nodes together: the distance between them, Eq. (35), and the seam of a closed belt.
 
 use super::support::RotationGap;
-use super::{BeltPoint, Rows, RowsByNode};
+use super::{BeltPoint, ROWS, Rows};
 use crate::geometry::{Pose, carried_hessian, hat};
-use nalgebra::{Matrix6, UnitQuaternion, Vector3};
+use nalgebra::{Matrix6, SMatrix, UnitQuaternion, Vector3};
 
 /// Conditions between two nodes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,7 +26,7 @@ pub enum Tie {
 }
 
 impl NodeLink {
-    pub(super) fn value(&self, point: &BeltPoint) -> Rows {
+    pub(super) fn value<const F: usize>(&self, point: &BeltPoint<F>) -> Rows {
         let [a, b] = self.nodes;
         let [first, second] = [a, b].map(|node| &point.poses[node]);
         let mut rows = Rows::zeros();
@@ -50,9 +50,12 @@ impl NodeLink {
     }
 
     /// Derivative of the values by both nodes' unknowns, of which the first are a twist in world axes about the origin.
-    pub(super) fn jacobian(&self, point: &BeltPoint) -> [RowsByNode; 2] {
+    pub(super) fn jacobian<const F: usize, const N: usize>(
+        &self,
+        point: &BeltPoint<F>,
+    ) -> [SMatrix<f64, ROWS, N>; 2] {
         let [first, second] = self.nodes.map(|node| &point.poses[node]);
-        let mut by = [RowsByNode::zeros(); 2];
+        let mut by = [SMatrix::zeros(); 2];
         if let Tie::Fields(factors) = self.tie {
             for (i, factor) in factors.into_iter().enumerate() {
                 if let Some(factor) = factor {
@@ -79,7 +82,11 @@ impl NodeLink {
     /// Second derivatives of `multipliers · values` by the twists of both nodes.
     ///
     /// Those of a frame tied to another are left out: where the tie is met they vanish in all directions that keep it.
-    pub(super) fn hessians(&self, point: &BeltPoint, multipliers: &Rows) -> [Matrix6<f64>; 2] {
+    pub(super) fn hessians<const F: usize>(
+        &self,
+        point: &BeltPoint<F>,
+        multipliers: &Rows,
+    ) -> [Matrix6<f64>; 2] {
         let force = match self.tie {
             Tie::Offset(_) | Tie::Pose(_) => multipliers.fixed_rows::<3>(0).into_owned(),
             Tie::Fields(_) => Vector3::zeros(),
@@ -124,7 +131,7 @@ mod tests {
         let h = 1e-6;
         for tie in ties {
             let link = NodeLink { nodes: [0, 1], tie };
-            let exact = link.jacobian(&point);
+            let exact = link.jacobian::<2, 8>(&point);
             for (node, by_node) in exact.iter().enumerate() {
                 for entry in 0..8 {
                     let moved = |size: f64| {

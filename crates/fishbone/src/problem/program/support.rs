@@ -1,8 +1,8 @@
 //! What holds a node: positions, frames, hinges, Eq. (35), (36).
 
-use super::{NodeMatrix, Rows, RowsByNode};
+use super::Rows;
 use crate::geometry::{Pose, carried_hessian, hat};
-use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Matrix6, Rotation3, UnitQuaternion, Vector3};
 
 /// What of a node's frame is prescribed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -256,9 +256,9 @@ impl NodeSupport {
         rows
     }
 
-    /// Derivative of the values by the node's unknowns, of which the first are a twist in world axes about the origin.
-    pub(super) fn jacobian(&self, pose: &Pose) -> RowsByNode {
-        let mut rows = RowsByNode::zeros();
+    /// Derivative of the values by the node's twist in world axes about the origin.
+    pub(super) fn jacobian(&self, pose: &Pose) -> Matrix6<f64> {
+        let mut rows = Matrix6::zeros();
         let by_turn = -hat(&pose.position);
         for (i, _) in self.components() {
             rows[(i, i)] = 1.0;
@@ -270,13 +270,10 @@ impl NodeSupport {
         rows
     }
 
-    /// Second derivative of `multipliers · value` by the node's unknowns.
-    pub(super) fn hessian(&self, pose: &Pose, multipliers: &Rows) -> NodeMatrix {
+    /// Second derivative of `multipliers · value` by the node's twist.
+    pub(super) fn hessian(&self, pose: &Pose, multipliers: &Rows) -> Matrix6<f64> {
         let force = self.held(&multipliers.fixed_rows::<3>(0).into());
-        let mut hessian = NodeMatrix::zeros();
-        hessian
-            .fixed_view_mut::<6, 6>(0, 0)
-            .copy_from(&carried_hessian(&pose.position, &force));
+        let mut hessian = carried_hessian(&pose.position, &force);
         let weights = multipliers.fixed_rows::<3>(3).into_owned();
         let by_turn = self.gap(pose).hessian(&weights);
         let mut turns = hessian.fixed_view_mut::<3, 3>(3, 3);

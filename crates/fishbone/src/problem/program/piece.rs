@@ -1,0 +1,64 @@
+//! What joins a node of the spine to the next.
+
+use crate::geometry::Pose;
+use crate::strip::element::Element;
+use crate::strip::spine::turn;
+use nalgebra::Vector3;
+
+/// What joins a node to the next.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "nearly all pieces are strips, read one after the other"
+)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Piece {
+    /// A flexible element.
+    Strip(Element),
+    /// A stiffened stretch.
+    Rigid {
+        /// Length along the spine.
+        length: f64,
+    },
+    /// A place of no length where the bend may jump, and the board turn.
+    Joint {
+        /// Angle χ by which the board turns, from η towards ζ.
+        angle: f64,
+    },
+}
+
+impl Piece {
+    /// Length along the spine.
+    pub fn length(&self) -> f64 {
+        match self {
+            Self::Strip(element) => element.length,
+            Self::Rigid { length } => *length,
+            Self::Joint { .. } => 0.0,
+        }
+    }
+
+    /// The motion along it, where that does not depend on the shape.
+    pub(super) fn fixed_motion(&self) -> Option<Pose> {
+        match self {
+            Self::Strip(_) => None,
+            Self::Rigid { length } => Some(Pose {
+                position: Vector3::y() * *length,
+                ..Pose::identity()
+            }),
+            Self::Joint { angle } => Some(turn(*angle)),
+        }
+    }
+}
+
+/// The rib slope beyond a bend of the board by χ, with two derivatives; `None` where the rib would leave through the
+/// bend: a rib there is one material line, α⁺ = α⁻ − χ.
+pub fn slope_beyond(slope: f64, angle: f64) -> Option<[f64; 3]> {
+    let (sine, cosine) = angle.sin_cos();
+    let denominator = cosine + slope * sine;
+    (denominator > 0.0).then(|| {
+        [
+            (slope * cosine - sine) / denominator,
+            denominator.powi(-2),
+            -2.0 * sine * denominator.powi(-3),
+        ]
+    })
+}
