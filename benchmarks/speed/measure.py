@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import re
@@ -21,6 +22,7 @@ from cases import curve, shell
 from speed.problem import ENERGIES, EXAMPLES, Answer, Pose, end_pose, path, scenario
 from speed.rivals import ENTRIES, OURS, Entry
 from speed.stopwatch import timed
+from tables import ROOT
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -49,6 +51,11 @@ BATCH = 10_000
 ENERGY: Energy = "fishbone"
 """Of the examples, and so of the warm updates."""
 RANDOM_ENERGY: Energy = "wunderlich"
+MORE_SOLVES, MORE_UPDATES = 6, 101
+"""Of what instructions are counted; the more, the less it matters what else a process does."""
+SAME_COUNT = {"PYTHONHASHSEED": "0", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+"""Without these no two counts are alike: strings hash otherwise, and idle threads of BLAS count while they wait."""
+HERE = ROOT / "benchmarks"
 SAME = 1e-6
 """Relative difference of energies up to which two shapes count as the same."""
 
@@ -267,21 +274,36 @@ def _in_process(*arguments: str, **environment: str) -> Record:
 
 
 def instructions() -> list[Record]:
-    """Instructions of one cold solve, by callgrind: of a process that solves twice less one that solves once."""
-    valgrind = shutil.which("valgrind")
-    if valgrind is None:
+    """Instructions of one cold solve."""
+    if shutil.which("valgrind") is None:
         return []
-    records = []
-    for example in _progress(EXAMPLES, "instructions"):
-        once, twice = (_counted(valgrind, example, solves) for solves in (1, 2))
-        records.append({"example": example, "instructions": twice - once})
-    return records
+    examples = _progress(EXAMPLES, "instructions")
+    return [{"example": example, "instructions": cold_instructions(example)} for example in examples]
 
 
-def _counted(valgrind: str, example: str, solves: int) -> int:
-    command = [valgrind, "--tool=callgrind", "--callgrind-out-file=/dev/null"]
-    command += [sys.executable, "-m", "speed.process", "solve", example, str(solves)]
-    told = subprocess.run(command, check=True, capture_output=True, text=True)
+def cold_instructions(example: str, python: str = sys.executable) -> int:
+    """Of one solve of an example as it is shipped, by the fishbone that this Python has."""
+    return _instructions(python, "solve", example, MORE_SOLVES)
+
+
+def warm_instructions(example: str, python: str = sys.executable) -> int:
+    """Of one update on the path, as the mean over the first of them."""
+    poses = itertools.islice(path(example, PATH + 1), MORE_UPDATES)
+    given = json.dumps([[pose.position.tolist(), pose.rotation.tolist()] for pose in poses])
+    return _instructions(python, "update", example, MORE_UPDATES, given)
+
+
+def _instructions(python: str, task: str, example: str, more: int, given: str = "") -> int:
+    """By callgrind: of a process that does its task so many times less one that does it once, for each time more."""
+    once, often = (_counted([python, "-m", "speed.process", task, example, str(times)], given) for times in (1, more))
+    return round((often - once) / (more - 1))
+
+
+def _counted(command: list[str], given: str) -> int:
+    command = ["valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null", *command]
+    told = subprocess.run(
+        command, check=True, capture_output=True, text=True, input=given, cwd=HERE, env=os.environ | SAME_COUNT
+    )
     found = re.search(r"Collected : (\d+)", told.stderr)
     assert found is not None
     return int(found[1])

@@ -1,6 +1,6 @@
 """One measurement of fishbone in a process of its own, printed as JSON: its peak memory, its threads, its instructions.
 
-python -m speed.process mesh ELEMENTS | batch COUNT | solve EXAMPLE TIMES
+python -m speed.process mesh ELEMENTS | batch COUNT | solve EXAMPLE TIMES | update EXAMPLE TIMES < POSES
 """
 
 from __future__ import annotations
@@ -81,6 +81,13 @@ def solve(example: str, times: str) -> dict[str, Any]:
     return {"energy": [fb.solve(scenario).energy for _ in range(int(times))]}
 
 
+def update(example: str, times: str) -> dict[str, Any]:
+    """The first so many updates of a tracker, through poses that are read; all are read in any case."""
+    poses = json.load(sys.stdin)
+    tracker = fb.Tracker(_example(example))
+    return {"iterations": [tracker.update(*pose).iterations for pose in poses[: int(times)]]}
+
+
 if __name__ == "__main__":
-    tasks: dict[str, Callable[..., dict[str, Any]]] = {"mesh": mesh, "batch": batch, "solve": solve}
+    tasks: dict[str, Callable[..., dict[str, Any]]] = {"mesh": mesh, "batch": batch, "solve": solve, "update": update}
     print(json.dumps(tasks[sys.argv[1]](*sys.argv[2:])))
