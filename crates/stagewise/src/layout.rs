@@ -71,7 +71,7 @@ impl Layout {
         assert!(self.row_weights.is_empty());
         self.stage_rows.truncate(1);
         for (rows, weight) in rows.into_iter().zip(&self.stage_weights) {
-            self.row_weights.extend(vec![*weight; rows]);
+            self.row_weights.extend(std::iter::repeat_n(*weight, rows));
             self.stage_rows.push(self.row_weights.len());
         }
         assert_eq!(self.stage_rows.len(), self.nodes());
@@ -174,6 +174,11 @@ impl Layout {
     /// Rows of the inequalities of a stage.
     pub fn stage_rows(&self, stage: usize) -> Range<usize> {
         self.stage_rows[stage]..self.stage_rows[stage + 1]
+    }
+
+    /// Numbers of inequalities of the stages, in order.
+    pub(crate) fn stage_counts(&self) -> impl Iterator<Item = usize> {
+        self.stage_rows.windows(2).map(|ends| ends[1] - ends[0])
     }
 
     /// Weight of every inequality in the barrier.

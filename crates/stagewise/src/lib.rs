@@ -45,6 +45,5 @@ fn largest<'a>(numbers: impl Iterator<Item = &'a f64>) -> f64 {
 
 /// Largest absolute entry; NaN where one is.
 fn largest_entry<const N: usize>(vectors: &[NodeVector<N>]) -> f64 {
-    let amax = vectors.iter().map(NodeVector::amax);
-    amax.fold(0.0, larger)
+    largest(vectors.iter().flatten())
 }

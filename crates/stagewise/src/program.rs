@@ -271,14 +271,14 @@ impl<const X: usize, const U: usize, const N: usize> Linearisation<X, U, N> {
     /// Change of every slack along a step, to first order.
     pub(crate) fn slack_rates(&self, step: &[NodeVector<N>], into: &mut [f64]) {
         let layout = &self.layout;
-        for stage in 0..layout.stages() {
-            for row in layout.stage_rows(stage) {
-                let [first, second] = &self.stage_slacks[row];
-                let ahead = along_controls::<X, U, N>(0.0, first, &step[stage]);
-                into[row] = along_controls::<X, U, N>(ahead, second, &step[stage + 1]);
+        let (of_stages, rest) = into.split_at_mut(layout.inequalities_at_stages());
+        let mut rows = self.stage_slacks.iter().zip(of_stages);
+        for (count, ends) in layout.stage_counts().zip(step.windows(2)) {
+            for ([first, second], rate) in rows.by_ref().take(count) {
+                let ahead = along_controls::<X, U, N>(0.0, first, &ends[0]);
+                *rate = along_controls::<X, U, N>(ahead, second, &ends[1]);
             }
         }
-        let (_, rest) = into.split_at_mut(layout.inequalities_at_stages());
         let mut rest = rest.iter_mut();
         let mut node_slacks = self.node_slacks.iter();
         for block in layout.inequalities_at() {
@@ -310,13 +310,16 @@ impl<const X: usize, const U: usize, const N: usize> Linearisation<X, U, N> {
         into: &mut [NodeVector<N>],
     ) {
         let layout = &self.layout;
-        for stage in 0..layout.stages() {
-            for row in layout.stage_rows(stage) {
+        let mut stage_slacks = self.stage_slacks.iter().enumerate();
+        for (stage, rows) in layout.stage_counts().enumerate() {
+            let [first, second, ..] = &mut into[stage..] else {
+                break;
+            };
+            for (row, slack) in stage_slacks.by_ref().take(rows) {
                 let factor = factor(row);
-                for (end, by) in self.stage_slacks[row].iter().enumerate() {
-                    for i in 0..U {
-                        into[stage + end][X + i] += factor * by[i];
-                    }
+                for i in 0..U {
+                    first[X + i] += factor * slack[0][i];
+                    second[X + i] += factor * slack[1][i];
                 }
             }
         }

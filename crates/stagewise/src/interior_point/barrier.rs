@@ -91,10 +91,13 @@ impl Barrier {
             primal: 1.0,
             dual: 1.0,
         };
-        for (row, step) in steps.iter_mut().enumerate() {
-            let (slack, multiplier, rate) = (slacks[row], multipliers[row], rates[row]);
-            let central = self.target(row) / slack;
-            *step = central - multiplier - stiffness[row] * rate;
+        let rows = slacks.iter().zip(multipliers).zip(rates);
+        let rows = rows.zip(stiffness).zip(&self.weights);
+        for (step, ((((slack, multiplier), rate), stiffness), weight)) in steps.iter_mut().zip(rows)
+        {
+            let (slack, multiplier, rate) = (*slack, *multiplier, *rate);
+            let central = self.parameter * weight / slack;
+            *step = central - multiplier - stiffness * rate;
             if rate < 0.0 {
                 lengths.primal = lengths.primal.min(-keep * slack / rate);
             }
@@ -114,10 +117,10 @@ impl Barrier {
         multipliers: &mut [f64],
     ) {
         const SPREAD: f64 = 1e10;
-        for (row, multiplier) in multipliers.iter_mut().enumerate() {
-            let central = self.target(row) / slacks[row];
-            *multiplier =
-                (*multiplier + length * steps[row]).clamp(central / SPREAD, central * SPREAD);
+        let rows = slacks.iter().zip(steps).zip(&self.weights);
+        for (multiplier, ((slack, step), weight)) in multipliers.iter_mut().zip(rows) {
+            let central = self.parameter * weight / slack;
+            *multiplier = (*multiplier + length * step).clamp(central / SPREAD, central * SPREAD);
         }
     }
 }

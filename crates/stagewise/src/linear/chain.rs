@@ -390,21 +390,17 @@ fn eliminate<const U: usize, const N: usize>(
     ];
     let [state_first, state_second] = [&stage.state_first.data.0, &stage.state_second.data.0];
     // The cost's derivative by the unknowns beyond, as the second controls or the first move these.
-    let mut toward: [[f64; N]; U] = std::array::from_fn(|j| cost[states + j]);
+    let mut toward = [[0.0; N]; U];
     let mut before = [[0.0; N]; U];
-    for i in 0..states {
-        for j in 0..U {
-            add_scaled(&mut toward[j], second[j][i], &cost[i]);
-        }
-        for j in 0..U {
-            add_scaled(&mut before[j], first[j][i], &cost[i]);
-        }
+    for j in 0..U {
+        toward[j] = carried(cost[states + j], &second[j], cost, states);
+        before[j] = carried([0.0; N], &first[j], cost, states);
     }
     let mut pivot = [[0.0; U]; U];
     for j in 0..U {
         for i in 0..=j {
-            let carried = toward[j][states + i] + dot_states::<U, N>(&second[i], &toward[j]);
-            pivot[i][j] = carried + controls.second.data.0[j][i];
+            let own = toward[j][states + i] + dot_states::<U, N>(&second[i], &toward[j]);
+            pivot[i][j] = own + controls.second.data.0[j][i];
             pivot[j][i] = pivot[i][j];
         }
     }
@@ -438,21 +434,32 @@ fn eliminate<const U: usize, const N: usize>(
     let (inverse, concave) = invert(&pivot, most)?;
     let mut gain = [[0.0; N]; U];
     for i in 0..U {
-        for j in 0..U {
-            add_scaled(&mut gain[i], inverse[i][j], &toward[j]);
+        for row in 0..N {
+            gain[i][row] = weighted::<U>(|j| toward[j][row], |j| inverse[i][j]);
         }
     }
     for column in 0..N {
-        let mut saved = [0.0; N];
-        for j in 0..U {
-            add_scaled(&mut saved, toward[j][column], &gain[j]);
-        }
         for row in 0..N {
-            cost[column][row] -= saved[row];
+            cost[column][row] -= weighted::<U>(|j| gain[j][row], |j| toward[j][column]);
         }
     }
-    *into = Elimination { inverse, gain };
+    into.inverse = inverse;
+    into.gain = gain;
     Ok(concave)
+}
+
+/// A column, and to it the columns of the cost by the states, each times the growth of its state.
+#[inline(always)]
+fn carried<const N: usize>(
+    mut column: [f64; N],
+    growth: &[f64; N],
+    cost: &Columns<N>,
+    states: usize,
+) -> [f64; N] {
+    for i in 0..states {
+        add_scaled(&mut column, growth[i], &cost[i]);
+    }
+    column
 }
 
 /// Lets the first controls bear what the second cost that follow them.
@@ -507,7 +514,7 @@ fn gather<const U: usize, const N: usize>(
             add_scaled(&mut before, -toward[j], &e.gain[j]);
         }
         for i in 0..U {
-            force[i] = (0..U).fold(0.0, |sum, j| sum + e.inverse[i][j] * toward[j]);
+            force[i] = weighted::<U>(|j| e.inverse[i][j], |j| toward[j]);
         }
         cost = before;
     }
@@ -529,7 +536,7 @@ fn spread<const U: usize, const N: usize>(
         let mut second = [0.0; U];
         for j in 0..U {
             let gain = &e.gain[j];
-            let by_controls = (0..U).fold(0.0, |sum, i| sum + gain[states + i] * node[states + i]);
+            let by_controls = weighted::<U>(|i| gain[states + i], |i| node[states + i]);
             let own = dot_states::<U, N>(gain, &node) + by_controls;
             second[j] = stage.tie[j] * node[states + j] - force[j] - own;
         }
@@ -550,14 +557,27 @@ fn add_scaled<const N: usize>(into: &mut [f64; N], by: f64, column: &[f64; N]) {
 #[inline(always)]
 fn dot_states<const U: usize, const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
     let states = N - U;
-    let mut sum = 0.0;
-    let mut i = 0;
+    if states == 1 {
+        return a[0] * b[0];
+    }
+    let mut sum = a[0] * b[0] + a[1] * b[1];
+    let mut i = 2;
     while i + 1 < states {
         sum += a[i] * b[i] + a[i + 1] * b[i + 1];
         i += 2;
     }
     if i < states {
         sum += a[i] * b[i];
+    }
+    sum
+}
+
+/// A sum of products, one a control, in order.
+#[inline(always)]
+fn weighted<const U: usize>(a: impl Fn(usize) -> f64, b: impl Fn(usize) -> f64) -> f64 {
+    let mut sum = a(0) * b(0);
+    for j in 1..U {
+        sum += a(j) * b(j);
     }
     sum
 }

@@ -42,6 +42,8 @@ pub(crate) struct Kkt<const X: usize, const U: usize, const N: usize> {
     node_weights: Vec<f64>,
     damping: f64,
     right: Vec<NodeVector<N>>,
+    /// Pull of the springs: zero but at the nodes of equalities.
+    pulls: Vec<NodeVector<N>>,
     correction: Vec<NodeVector<N>>,
     /// Forces that the inequalities between pairs take along the step.
     pair_forces: Vec<f64>,
@@ -71,6 +73,7 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
             node_weights: layout.node_weights(),
             damping: 0.0,
             right: zeros.clone(),
+            pulls: zeros.clone(),
             correction: zeros.clone(),
             pair_forces: vec![0.0; linear.pair_slacks.len()],
             rates: vec![0.0; layout.equalities()],
@@ -108,18 +111,19 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         counts: impl Fn(f64, f64) -> bool,
     ) {
         let weights = self.linear.layout().row_weights();
-        for (row, stiffness) in self.stiffness.iter_mut().enumerate() {
-            let (slack, multiplier) = (values.slacks[row], multipliers[row]);
-            let counted = counts(slack, multiplier / weights[row]);
+        let rows = values.slacks.iter().zip(multipliers).zip(weights);
+        for (stiffness, ((slack, multiplier), weight)) in self.stiffness.iter_mut().zip(rows) {
+            let counted = counts(*slack, multiplier / weight);
             *stiffness = if counted { multiplier / slack } else { 0.0 };
         }
         let layout = self.linear.layout();
         self.diagonal
             .controls
             .copy_from_slice(&self.linear.diagonal.controls);
-        for (k, controls) in self.diagonal.controls.iter_mut().enumerate() {
-            for row in layout.stage_rows(k) {
-                controls.add_square(self.stiffness[row], &self.linear.stage_slacks[row]);
+        let mut rows = self.stiffness.iter().zip(&self.linear.stage_slacks);
+        for (controls, count) in self.diagonal.controls.iter_mut().zip(layout.stage_counts()) {
+            for (stiffness, slack) in rows.by_ref().take(count) {
+                controls.add_square(*stiffness, slack);
             }
         }
         self.diagonal
@@ -296,35 +300,58 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         let at_nodes = self.layout().equalities_at_nodes();
         let (targets_at, targets_between) = targets.split_at(at_nodes);
         self.right.copy_from_slice(gradient);
-        self.step.fill(NodeVector::zeros());
         self.multiplier_step.fill(0.0);
         self.pair_forces.fill(0.0);
-        for _ in 0..=REFINEMENTS {
-            self.pull_at_nodes(targets_at);
+        self.pull_at_nodes(targets_at);
+        self.linear
+            .chain
+            .solve(&mut self.factor, &self.right, &mut self.correction);
+        self.correct_pairs(targets_between, None);
+        std::mem::swap(&mut self.step, &mut self.correction);
+        for _ in 0..REFINEMENTS {
+            let most = self.take_missing_at_nodes(targets_at);
+            if most <= EXACT && self.border.rows.is_empty() {
+                return;
+            }
+            self.pull_again_at_nodes(targets_at);
             self.linear
                 .chain
-                .solve(&mut self.factor, &self.right, &mut self.correction);
-            self.correct_pairs(targets_between);
+                .solve(&mut self.factor, &self.pulls, &mut self.correction);
+            let step = std::mem::take(&mut self.step);
+            self.correct_pairs(targets_between, Some(&step));
+            self.step = step;
             for (step, correction) in self.step.iter_mut().zip(&self.correction) {
                 *step += correction;
             }
-            let most = self.take_missing_at_nodes(targets_at);
-            if most <= EXACT && self.border.rows.is_empty() {
-                break;
-            }
-            self.right.fill(NodeVector::zeros());
         }
+        self.take_missing_at_nodes(targets_at);
     }
 
-    /// Adds the springs' pull by what the step misses of the targets at nodes to the right-hand side.
+    /// Adds the springs' pull by the targets at nodes to the right-hand side.
     fn pull_at_nodes(&mut self, targets: &[f64]) {
         let mut rows = self.linear.equalities_at.iter().zip(targets);
         for block in self.linear.layout().equalities_at() {
             let mut pull = NodeVector::zeros();
             for (row, target) in rows.by_ref().take(block.rows) {
-                pull += (product(row, &self.step[block.at]) + target) * row;
+                pull += *target * row;
             }
             self.right[block.at] += pull / COMPLIANCE;
+        }
+    }
+
+    /// Finds the springs' pull by what the step misses of the targets at nodes.
+    fn pull_again_at_nodes(&mut self, targets: &[f64]) {
+        let layout = self.linear.layout();
+        for block in layout.equalities_at() {
+            self.pulls[block.at].fill(0.0);
+        }
+        let mut rows = self.linear.equalities_at.iter().zip(targets);
+        for block in layout.equalities_at() {
+            let mut pull = NodeVector::zeros();
+            for (row, target) in rows.by_ref().take(block.rows) {
+                pull += (product(row, &self.step[block.at]) + target) * row;
+            }
+            self.pulls[block.at] += pull / COMPLIANCE;
         }
     }
 
@@ -344,12 +371,15 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         most
     }
 
-    /// Bends the correction to the rows between pairs.
-    fn correct_pairs(&mut self, targets: &[f64]) {
+    /// Bends the correction of a step, or of none yet, to the rows between pairs.
+    fn correct_pairs(&mut self, targets: &[f64], step: Option<&[NodeVector<N>]>) {
         if self.border.rows.is_empty() {
             return;
         }
-        let mut missing: Vec<f64> = self.border.changes(&self.step).collect();
+        let mut missing: Vec<f64> = match step {
+            Some(step) => self.border.changes(step).collect(),
+            None => vec![0.0; self.border.rows.len()],
+        };
         let (equalities, inequalities) = missing.split_at_mut(targets.len());
         for (missing, target) in equalities.iter_mut().zip(targets) {
             *missing += target;
@@ -378,7 +408,6 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
     ) {
         let targets_at = &targets[..self.layout().equalities_at_nodes()];
         self.right.copy_from_slice(gradient);
-        self.step.fill(NodeVector::zeros());
         self.pull_at_nodes(targets_at);
         self.linear
             .chain

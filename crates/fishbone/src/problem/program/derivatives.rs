@@ -38,9 +38,15 @@ impl<D: Density<F>, const F: usize, const N: usize> Program<6, F, N> for BeltPro
     fn evaluate(&self, point: &mut BeltPoint<F>, values: &mut Values) -> bool {
         values.slacks.clear();
         for (k, element) in self.elements() {
-            let slacks = element.strips().slacks(slopes_of(&point.fields, k));
-            let bounds = element.strips().bounds();
-            values.slacks.extend(bounds.map(|bound| slacks[bound]));
+            let strips = element.strips();
+            let slacks = strips.slacks(slopes_of(&point.fields, k));
+            let [plus, minus, further @ ..] = slacks;
+            values.slacks.extend([plus, minus]);
+            for (slack, edge) in further.into_iter().zip(&strips.further) {
+                if edge.is_some() {
+                    values.slacks.push(slack);
+                }
+            }
         }
         values.equalities.clear();
         if self.rib_leaves_through_bend(point) {
