@@ -70,7 +70,7 @@ $(VENV)/.rust: $(VENV)/.packages $(RUST_SOURCES)
 	@echo "checking the Rust code"
 	@cargo fmt --all --check
 	@cargo clippy --quiet --locked --workspace --all-targets -- --deny warnings
-	@RUSTDOCFLAGS="--deny warnings" cargo doc --quiet --locked --no-deps --package fishbone
+	@RUSTDOCFLAGS="--deny warnings" cargo doc --quiet --locked --no-deps --package fishbone --package stagewise
 	@echo "testing the Rust code"
 	@cargo test --quiet --locked --workspace
 	@touch $@
