@@ -113,7 +113,11 @@ pub trait Program<const X: usize, const U: usize, const N: usize> {
     fn equality_gradients(&self, point: &Self::Point, into: &mut [NodeVector<N>]);
 
     /// Derivatives at a point that has been evaluated, of the objective plus multipliers times equalities; the second ones
-    /// with multipliers times slacks of the inequalities taken off.
+    /// with multipliers times slacks of the inequalities taken off. First derivatives of the slacks stand by themselves: the
+    /// solver adds them to the gradient.
+    ///
+    /// The gradient is by the unknowns: states beyond the first have none. Second derivatives by the states of both nodes of a
+    /// pair are left out, so that constraints of pairs that are not linear converge more slowly.
     fn linearise(
         &self,
         point: &Self::Point,

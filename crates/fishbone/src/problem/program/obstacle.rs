@@ -1,7 +1,7 @@
 //! Obstacles: inequalities of a node's position.
 
-use crate::geometry::{Pose, carried_gradient, carried_hessian};
-use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
+use crate::geometry::{Pose, carried_gradient, carried_hessian, hat};
+use nalgebra::{Matrix3, Matrix3x6, Matrix6, Vector3, Vector6};
 use std::fmt::Debug;
 use std::sync::Arc;
 
@@ -56,17 +56,15 @@ impl NodeObstacle {
     pub(super) fn hessian(&self, pose: &Pose) -> Matrix6<f64> {
         let point = &pose.position;
         let curved = self.obstacle.hessian(point);
-        let by_twist = carried_gradient_matrix(point);
+        let by_twist = by_twist(point);
         by_twist.tr_mul(&(curved * by_twist))
             + carried_hessian(point, &self.obstacle.gradient(point))
     }
 }
 
 /// Derivative of a point by a twist about the origin.
-fn carried_gradient_matrix(point: &Vector3<f64>) -> nalgebra::Matrix3x6<f64> {
-    let mut by_twist = nalgebra::Matrix3x6::identity();
-    by_twist
-        .fixed_columns_mut::<3>(3)
-        .copy_from(&-crate::geometry::hat(point));
+fn by_twist(point: &Vector3<f64>) -> Matrix3x6<f64> {
+    let mut by_twist = Matrix3x6::identity();
+    by_twist.fixed_columns_mut::<3>(3).copy_from(&-hat(point));
     by_twist
 }
