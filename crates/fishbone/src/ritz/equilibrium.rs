@@ -24,13 +24,7 @@ pub(crate) fn solve(
         energy: scenario.energy,
         bulge: side(start, &to_end, &problem.bulge()),
     };
-    let spec = &scenario.solver.ritz;
-    let options = Options {
-        basis: spec.basis,
-        points: spec.points,
-        penalty: spec.penalty,
-        updates: spec.updates,
-    };
+    let options = Options::from(&scenario.solver.ritz);
     let solution = ritz::solve(&clamped, &options, proceed);
     report(problem, start, &solution)
 }

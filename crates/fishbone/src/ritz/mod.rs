@@ -19,6 +19,7 @@ mod lagrangian;
 mod local;
 mod newton;
 
+use crate::scenario::RitzSpec;
 use crate::strip::developable::EnergyModel;
 use basis::{FIELDS, localiser, quadrature};
 use lagrangian::Lagrangian;
@@ -101,15 +102,21 @@ pub struct Options {
     pub updates: usize,
 }
 
+impl From<&RitzSpec> for Options {
+    fn from(spec: &RitzSpec) -> Self {
+        Self {
+            basis: spec.basis,
+            points: spec.points,
+            penalty: spec.penalty,
+            updates: spec.updates,
+        }
+    }
+}
+
 impl Default for Options {
     /// The source's numbers, and the penalty at which its printed shapes come out.
     fn default() -> Self {
-        Self {
-            basis: 10,
-            points: 16,
-            penalty: 1e2,
-            updates: 1,
-        }
+        Self::from(&RitzSpec::default())
     }
 }
 
