@@ -25,7 +25,7 @@
 //! Deformation".
 //!
 //! ```
-//! use fishbone::{problem::Problem, scenario::Scenario, solve::solve};
+//! use fishbone::prelude::*;
 //! use std::ops::ControlFlow;
 //!
 //! // A belt whose ends face each other at 0.6 of its length: the planar elastica.
@@ -42,7 +42,7 @@
 //! let equilibrium = solve(&problem, &mut || ControlFlow::Continue(()));
 //! assert!((equilibrium.energy - 17.6586).abs() < 1e-4);
 //! assert!((equilibrium.highest_point().position.x - 0.3487).abs() < 1e-4);
-//! # Ok::<(), fishbone::scenario::error::ScenarioError>(())
+//! # Ok::<(), ScenarioError>(())
 //! ```
 
 pub mod analysis;
@@ -57,3 +57,21 @@ pub mod scenario;
 pub mod solve;
 pub mod strip;
 pub mod surface;
+
+/// The names that most uses need.
+pub mod prelude {
+    pub use crate::analysis::branches::{Watch, branches};
+    pub use crate::analysis::continuation::{Diagram, Settings, follow};
+    pub use crate::analysis::margin::Margin;
+    pub use crate::analysis::modes::Mode;
+    pub use crate::analysis::path::{Motion, Path};
+    pub use crate::analysis::sensitivity::{Parameters, Sensitivity};
+    pub use crate::analysis::tracking::{Tracker, Update};
+    pub use crate::equilibrium::{Equilibrium, Stability, Status};
+    pub use crate::geometry::{Pose, Wrench};
+    pub use crate::problem::Problem;
+    pub use crate::scenario::Scenario;
+    pub use crate::scenario::error::ScenarioError;
+    pub use crate::solve::{solve, solve_from};
+    pub use crate::strip::density::Density;
+}

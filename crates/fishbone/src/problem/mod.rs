@@ -46,7 +46,7 @@ const ROTATION_TOLERANCE: f64 = 1e-6;
 /// scenario.belt.width = -0.1;
 /// let refused = Problem::new(scenario).unwrap_err();
 /// assert_eq!(refused.to_string(), "belt.width: found -0.1, must be a positive finite number");
-/// # Ok::<(), fishbone::error::ScenarioError>(())
+/// # Ok::<(), fishbone::scenario::error::ScenarioError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Problem {
