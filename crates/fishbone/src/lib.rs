@@ -17,14 +17,16 @@
 //! | [`ritz`] | the source's own method, Eq. (37)–(43), as history |
 //! | [`solve`] | from a problem to an equilibrium, by the method asked for |
 //! | [`analysis`] | modes, derivatives, tracking, continuation, margins, all equilibria |
-//! | [`io`] | results as JSON |
+//! | [`io`] | scenarios as TOML and JSON, results as JSON |
 //!
-//! Every room uses only those above it in this table; a test keeps it so.
+//! Every room uses only those above it in this table; a test keeps it so. The last is there with the feature `io`, which is
+//! on by default: without it, a scenario is made of its Rust types.
 //!
 //! Equation numbers, as in `Eq. (34)`, are those of Wakamatsu, Arai and Hirai, "Fishbone Model for Belt Object
 //! Deformation".
 //!
-//! ```
+#![cfg_attr(feature = "io", doc = "```")]
+#![cfg_attr(not(feature = "io"), doc = "```ignore")]
 //! use fishbone::prelude::*;
 //! use std::ops::ControlFlow;
 //!
@@ -49,6 +51,7 @@ pub mod analysis;
 pub mod board;
 pub mod equilibrium;
 pub mod geometry;
+#[cfg(feature = "io")]
 pub mod io;
 pub mod names;
 pub mod problem;

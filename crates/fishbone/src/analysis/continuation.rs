@@ -8,7 +8,6 @@ use crate::names::named;
 use crate::problem::program::{BeltPoint, BeltProgram};
 use crate::problem::{Mesh, Problem};
 use crate::surface;
-use serde::Serialize;
 use stagewise::{Continuation, Distance, Events, Family, Pace, Residuals, Stationary, Turn};
 use std::ops::ControlFlow;
 use thiserror::Error;
@@ -22,7 +21,7 @@ type Curve = stagewise::Curve<BeltPoint, (), 8>;
 
 named! {
     /// Why a branch ended.
-    #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
     pub enum End {
         /// The path ends.
         Range = "range",
@@ -167,7 +166,7 @@ pub struct Summary {
 
 named! {
     /// What happens at an event.
-    #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
     pub enum Kind {
         /// The branch turns back.
         Fold = "fold",

@@ -5,41 +5,50 @@ use crate::names::named;
 use crate::problem::Problem;
 use crate::scenario::error::ScenarioError;
 use nalgebra::Vector3;
-use serde::Serialize;
-use serde_json::Value;
+use std::fmt::Debug;
+use std::sync::Arc;
 use thiserror::Error;
 
-/// How a problem changes: the problem where the path begins, and what of its scenario differs from place to place.
-#[derive(Debug, Clone, PartialEq)]
+/// What changes along a path.
+pub trait Change: Debug + Send + Sync {
+    /// The problem at a place on the path that begins at `base`, or a little before or beyond it.
+    ///
+    /// # Errors
+    ///
+    /// Where there is no such problem.
+    fn problem(&self, base: &Problem, place: f64) -> Result<Problem, NoPath>;
+
+    /// How far the path goes from 0.
+    fn length(&self) -> f64 {
+        1.0
+    }
+
+    /// What a place on the path is called.
+    fn parameter(&self, place: f64) -> f64 {
+        place
+    }
+}
+
+/// How a problem changes: the problem where the path begins, and what differs from place to place.
+///
+/// A clone shares the change.
+#[derive(Debug, Clone)]
 pub struct Path {
     base: Problem,
-    change: Change,
+    change: Arc<dyn Change>,
 }
 
-#[derive(Debug, Clone, PartialEq)]
-enum Change {
-    /// Numbers of the scenario, each from its own value to another.
-    Numbers { base: Value, numbers: Vec<Number> },
-    /// Poses of a support, one after the other; the first is its own.
-    Poses {
-        support: usize,
-        poses: Vec<Pose>,
-        motion: Motion,
-    },
-}
-
-/// A number of a scenario that changes.
-#[derive(Debug, Clone, PartialEq)]
-struct Number {
-    /// Where it stands, a JSON pointer.
-    pointer: String,
-    from: f64,
-    to: f64,
+/// Poses of a support, one after the other; the first is its own.
+#[derive(Debug)]
+struct Poses {
+    support: usize,
+    poses: Vec<Pose>,
+    motion: Motion,
 }
 
 named! {
     /// How a support moves from one pose to the next.
-    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
     pub enum Motion {
         /// Its point on a straight line, its frame about a fixed axis, both at a steady rate.
         #[default]
@@ -91,50 +100,18 @@ named!(impl NoPath {
     Unreadable = "unreadable",
 });
 
-/// A value that is no number as text; by its kind where that is long.
-fn shown(value: &Value) -> String {
-    const SHORT: usize = 40;
-    let text = value.to_string();
-    match value {
-        Value::Object(_) if text.len() > SHORT => "a table".to_owned(),
-        Value::Array(_) if text.len() > SHORT => "a list".to_owned(),
-        _ => text,
-    }
-}
-
 impl Path {
-    /// Numbers of the scenario, each named as in `supports[1].position[2]`, that change together from their own values to
-    /// others.
+    /// A path from a problem to that at the end of a change.
     ///
     /// # Errors
     ///
-    /// [`NoPath`] where no such number stands in the scenario, and where the scenario at the end is not valid.
-    pub fn numbers(problem: &Problem, changes: &[(String, f64)]) -> Result<Self, NoPath> {
-        let base = serde_json::to_value(problem.scenario()).expect("a scenario is plain data");
-        let number = |(field, to): &(String, f64)| {
-            let pointer = pointer(field);
-            let found = base.pointer(&pointer);
-            let from = found.and_then(Value::as_f64);
-            let from = from.ok_or_else(|| NoPath::NoNumber {
-                field: field.clone(),
-                found: found.map_or("nothing".to_owned(), shown),
-                example: "supports[1].position[1]".to_owned(),
-            })?;
-            Ok(Number {
-                pointer,
-                from,
-                to: *to,
-            })
-        };
-        let numbers: Vec<_> = changes.iter().map(number).collect::<Result<_, _>>()?;
-        if numbers.iter().all(|number| number.from == number.to) {
-            return Err(NoPath::Nothing);
-        }
-        Self {
-            base: problem.clone(),
-            change: Change::Numbers { base, numbers },
-        }
-        .checked()
+    /// [`NoPath`] where there is no problem at the end.
+    pub fn new(base: &Problem, change: impl Change + 'static) -> Result<Self, NoPath> {
+        change.problem(base, change.length())?;
+        Ok(Self {
+            base: base.clone(),
+            change: Arc::new(change),
+        })
     }
 
     /// A support that moves from its own pose through others, each a position and a rotation vector, world axes.
@@ -169,15 +146,12 @@ impl Path {
         if poses.iter().all(|pose| *pose == first) {
             return Err(NoPath::Nothing);
         }
-        Self {
-            base: problem.clone(),
-            change: Change::Poses {
-                support,
-                poses,
-                motion,
-            },
-        }
-        .checked()
+        let change = Poses {
+            support,
+            poses,
+            motion,
+        };
+        Self::new(problem, change)
     }
 
     /// The problem where the path begins.
@@ -187,66 +161,31 @@ impl Path {
 
     /// How far the path goes: 1, or the number of poses after the first.
     pub fn length(&self) -> f64 {
-        match &self.change {
-            Change::Numbers { .. } => 1.0,
-            Change::Poses { poses, .. } => poses.len() as f64 - 1.0,
-        }
+        self.change.length()
     }
 
     /// What a place on the path is called: the number that changes where there is one, else how far along the path it is.
     pub fn parameter(&self, place: f64) -> f64 {
-        match &self.change {
-            Change::Numbers { numbers, .. } => match numbers.as_slice() {
-                [number] => number.at(place),
-                _ => place,
-            },
-            Change::Poses { .. } => place,
-        }
+        self.change.parameter(place)
     }
 
     /// The problem at a place on the path, or a little before or beyond it; `None` where the scenario there is not valid.
     pub fn at(&self, place: f64) -> Option<Problem> {
-        self.problem(place).ok()
-    }
-
-    fn problem(&self, place: f64) -> Result<Problem, NoPath> {
-        match &self.change {
-            Change::Numbers { base, numbers } => {
-                let mut tables = base.clone();
-                for number in numbers {
-                    if let Some(value) = tables.pointer_mut(&number.pointer) {
-                        *value = number.at(place).into();
-                    }
-                }
-                let scenario = serde_json::from_value(tables)
-                    .map_err(|error| NoPath::Unreadable(error.to_string()))?;
-                Problem::new(scenario).map_err(NoPath::Invalid)
-            }
-            Change::Poses {
-                support,
-                poses,
-                motion,
-            } => {
-                let leg = (place.max(0.0) as usize).min(poses.len() - 2);
-                let pose = motion.between(&poses[leg], &poses[leg + 1], place - leg as f64);
-                let moved = self.base.with_support_pose(*support, &pose);
-                moved.map_err(NoPath::Invalid)
-            }
-        }
-    }
-
-    fn checked(self) -> Result<Self, NoPath> {
-        self.problem(self.length())?;
-        Ok(self)
+        self.change.problem(&self.base, place).ok()
     }
 }
 
-impl Number {
-    fn at(&self, place: f64) -> f64 {
-        match place {
-            1.0 => self.to,
-            _ => self.from + place * (self.to - self.from),
-        }
+impl Change for Poses {
+    fn problem(&self, base: &Problem, place: f64) -> Result<Problem, NoPath> {
+        let leg = (place.max(0.0) as usize).min(self.poses.len() - 2);
+        let [from, to] = [&self.poses[leg], &self.poses[leg + 1]];
+        let pose = self.motion.between(from, to, place - leg as f64);
+        let moved = base.with_support_pose(self.support, &pose);
+        moved.map_err(NoPath::Invalid)
+    }
+
+    fn length(&self) -> f64 {
+        self.poses.len() as f64 - 1.0
     }
 }
 
@@ -265,10 +204,4 @@ impl Motion {
             }
         }
     }
-}
-
-/// The JSON pointer of a field: `supports[1].position[2]` is `/supports/1/position/2`.
-fn pointer(field: &str) -> String {
-    let parts = field.split(['.', '[', ']']).filter(|part| !part.is_empty());
-    parts.flat_map(|part| ["/", part]).collect()
 }

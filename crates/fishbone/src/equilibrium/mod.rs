@@ -14,9 +14,9 @@ use crate::problem::Problem;
 use crate::problem::program::{BeltPoint, BeltProgram};
 use crate::scenario::{SAME_PLACE, Scenario};
 use crate::strip::spine::Spine;
+use crate::surface::{HighestPoint, highest_point};
 use guess::{guess, waved};
 use nalgebra::{Vector2, Vector3};
-use serde::Serialize;
 use stagewise::{Inertia, Multipliers, Residuals, Stationary};
 use std::ops::ControlFlow;
 use thiserror::Error;
@@ -25,7 +25,7 @@ pub(crate) use intrinsic::{is_settled, of_solution};
 
 named! {
     /// How a solve ended.
-    #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
     pub enum Status {
         /// All residuals are within the tolerance.
         Converged = "converged",
@@ -135,6 +135,11 @@ impl Equilibrium {
     /// The input, normalised.
     pub fn scenario(&self) -> &Scenario {
         self.problem.scenario()
+    }
+
+    /// The point of the spine farthest along `solver.bulge`.
+    pub fn highest_point(&self) -> HighestPoint {
+        highest_point(&self.spine, &self.problem.bulge())
     }
 
     /// The programme and its solution, where the solve has converged by a method that knows multipliers: what every

@@ -124,11 +124,6 @@ impl Equilibrium {
     pub fn to_json(&self) -> String {
         serde_json::to_string(&Record::new(self)).expect("numbers and strings alone")
     }
-
-    /// The point of the spine farthest along `solver.bulge`.
-    pub fn highest_point(&self) -> surface::HighestPoint {
-        surface::highest_point(&self.spine, &self.problem.bulge())
-    }
 }
 
 impl<'a> Record<'a> {

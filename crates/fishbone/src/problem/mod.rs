@@ -32,14 +32,10 @@ const ROTATION_TOLERANCE: f64 = 1e-6;
 /// A clone shares the scenario and the belt.
 ///
 /// ```
-/// use fishbone::{problem::Problem, scenario::Scenario};
+/// use fishbone::problem::Problem;
+/// use fishbone::scenario::{BeltSpec, Scenario, SegmentSpec};
 ///
-/// let mut scenario = Scenario::from_toml(
-///     r#"
-///     belt = { width = 0.1, rigidity = 2.0, segments = [{ kind = "straight", length = 0.5 }] }
-///     supports = [{ at = "end", position = [0, 0.3, 0] }]
-///     "#,
-/// )?;
+/// let mut scenario = Scenario::new(BeltSpec::new(0.1, 2.0, vec![SegmentSpec::straight(0.5)]));
 /// let problem = Problem::new(scenario.clone())?;
 /// assert_eq!(problem.units().energy, 2.0 / 0.5);
 ///

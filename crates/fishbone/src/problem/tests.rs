@@ -1,19 +1,26 @@
 use super::*;
 use crate::geometry::exp;
-use crate::scenario::{Place, Rigidity, RigidityTable, SegmentSpec};
+use crate::scenario::{BeltSpec, Place, Rigidity, RigidityTable, SegmentSpec};
 use std::f64::consts::PI;
 
 fn scenario() -> Scenario {
-    Scenario::from_toml(
-        r#"
-        belt = { width = 0.1, rigidity = 2.0, segments = [{ kind = "straight", length = 1.0 }] }
-        supports = [
-          { at = "start", position = [3, 0, 0], rotation = [0, 0, 0] },
-          { at = "end", position = [3, 0.6, 0], euler = [0.1, 0, 0] },
-        ]
-        "#,
-    )
-    .unwrap()
+    let belt = BeltSpec::new(0.1, 2.0, vec![SegmentSpec::straight(1.0)]);
+    let held = |position: [f64; 3]| Some(position.map(Component::Held));
+    Scenario {
+        supports: vec![
+            SupportSpec {
+                position: held([3.0, 0.0, 0.0]),
+                rotation: Some([0.0; 3]),
+                ..SupportSpec::new(Place::Start)
+            },
+            SupportSpec {
+                position: held([3.0, 0.6, 0.0]),
+                euler: Some([0.1, 0.0, 0.0]),
+                ..SupportSpec::new(Place::End)
+            },
+        ],
+        ..Scenario::new(belt)
+    }
 }
 
 fn problem() -> Problem {

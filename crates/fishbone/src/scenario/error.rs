@@ -58,7 +58,20 @@ named!(impl ScenarioError {
     Invalid = "invalid",
 });
 
+/// Longest piece of the input that an error repeats, in characters.
+pub(crate) const LONGEST_QUOTE: usize = 60;
+
 impl ScenarioError {
+    /// The error of a word outside a list of words, at no field yet.
+    pub(crate) fn choice(found: &str, words: &[&str]) -> Self {
+        Self::UnknownChoice {
+            field: String::new(),
+            found: cut(found),
+            nearest: None,
+            allowed: words.iter().map(|word| (*word).to_owned()).collect(),
+        }
+    }
+
     /// An [`ScenarioError::Invalid`] of these parts.
     pub(crate) fn invalid(
         field: impl Into<String>,
@@ -92,6 +105,27 @@ impl ScenarioError {
         }
         self
     }
+}
+
+/// A number as TOML writes it.
+pub(crate) fn number(value: f64) -> String {
+    if value.is_nan() {
+        "nan".into()
+    } else {
+        format!("{value:?}")
+    }
+}
+
+/// A text on one line, cut to a readable length.
+pub(crate) fn cut(text: &str) -> String {
+    let mut characters = text.chars();
+    let head: String = characters.by_ref().take(LONGEST_QUOTE).collect();
+    let tail = if characters.next().is_some() {
+        "…"
+    } else {
+        ""
+    };
+    head.escape_debug().to_string() + tail
 }
 
 fn hint(nearest: &Option<String>) -> String {

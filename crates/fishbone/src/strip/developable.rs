@@ -7,12 +7,10 @@ use crate::strip::kernel;
 use crate::strip::ribs::{Across, Scaled};
 use nalgebra::{Matrix2, Vector2, Vector4};
 use num_dual::DualNum;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 named! {
     /// Bending energy per unit length of the spine.
-    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
     pub enum EnergyModel {
         /// The source's: R_f/2 · sqrt(1+β²) · κ₁², Eq. (34).
         Fishbone = "fishbone",

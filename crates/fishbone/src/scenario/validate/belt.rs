@@ -1,6 +1,5 @@
 //! What the board must satisfy: its segments and what they are made of.
 
-use super::super::node::{choice, number};
 use super::super::{
     BeltSpec, LayerSpec, MaterialSpec, Rigidity, RigidityTable, SAME_PLACE, SegmentSpec,
 };
@@ -9,6 +8,7 @@ use super::check::{
     require, span,
 };
 use crate::board::material::{Material, PRESETS};
+use crate::scenario::error::{ScenarioError, number};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, TAU};
 use std::fmt::Arguments;
 use std::ops::RangeInclusive;
@@ -331,7 +331,7 @@ fn check_preset(field: Arguments, name: &str) -> Check {
         return Ok(());
     }
     let names = PRESETS.map(|(known, _)| known);
-    Err(choice(name, &names).map_field(|_| field.to_string()))
+    Err(ScenarioError::choice(name, &names).map_field(|_| field.to_string()))
 }
 
 fn check_poisson(field: Arguments, value: f64) -> Check {

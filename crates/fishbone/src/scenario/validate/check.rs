@@ -1,7 +1,6 @@
 //! The questions that every part of a scenario is asked, and how a refusal reads.
 
-use super::super::node::number;
-use crate::scenario::error::ScenarioError;
+use crate::scenario::error::{ScenarioError, number};
 use std::fmt::{Arguments, Display};
 use std::ops::RangeInclusive;
 

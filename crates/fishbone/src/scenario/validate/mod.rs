@@ -4,9 +4,8 @@ mod belt;
 mod check;
 mod outside;
 
-use super::node::number;
 use super::{Method, Scenario, SolverSpec, SupportSpec};
-use crate::scenario::error::ScenarioError;
+use crate::scenario::error::{ScenarioError, number};
 use check::{Check, between, finite_vector, is_positive, require, span};
 use nalgebra::Vector3;
 use outside::{Extent, check_links, check_supports};

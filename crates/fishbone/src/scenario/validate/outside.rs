@@ -1,10 +1,10 @@
 //! What supports, links and loads must satisfy: what acts on the board from outside.
 
-use super::super::node::number;
 use super::super::{LinkSpec, LoadsSpec, Place, SAME_PLACE, SupportSpec};
 use super::check::{
     Check, at_most, bounded_vector, finite_vector, given, near, near_vector, require,
 };
+use crate::scenario::error::number;
 use nalgebra::Vector4;
 use std::fmt::Arguments;
 

@@ -1,6 +1,6 @@
 //! Fields that may be of more than one type, read so that an error says what was found and what is allowed.
 
-use super::{Component, Place, Rigidity, RigidityTable, SegmentSpec};
+use crate::scenario::{Component, Place, Rigidity, RigidityTable, SegmentSpec};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{
     self, Deserializer, IgnoredAny, MapAccess, Unexpected, Visitor, value::MapAccessDeserializer,
@@ -149,6 +149,15 @@ impl<'de> Deserialize<'de> for Rigidity {
         }
 
         deserializer.deserialize_any(RigidityVisitor)
+    }
+}
+
+impl Serialize for Rigidity {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Constant(value) => serializer.serialize_f64(*value),
+            Self::Table(table) => table.serialize(serializer),
+        }
     }
 }
 

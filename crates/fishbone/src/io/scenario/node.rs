@@ -3,16 +3,13 @@
 //! Serde's own readers of TOML and JSON turn errors into text before the path of the field is known; reading from a
 //! tree of our own keeps them as data, and gives both formats one set of messages.
 
-use crate::scenario::error::ScenarioError;
+use crate::scenario::error::{LONGEST_QUOTE, ScenarioError, cut, number};
 use serde::Deserialize;
 use serde::de::{
     self, DeserializeSeed, Deserializer, Expected, IntoDeserializer, Unexpected, Visitor,
 };
 use std::fmt::{self, Display};
 use std::vec;
-
-/// Longest piece of the input that an error repeats, in characters.
-const LONGEST_QUOTE: usize = 60;
 
 /// The key under which the TOML reader hands over a date.
 const TOML_DATE_KEY: &str = "$__toml_private_datetime";
@@ -55,15 +52,6 @@ impl Node {
     }
 }
 
-/// A number as TOML writes it.
-pub(super) fn number(value: f64) -> String {
-    if value.is_nan() {
-        "nan".into()
-    } else {
-        format!("{value:?}")
-    }
-}
-
 fn count(entries: usize) -> String {
     match entries {
         1 => "an array of 1 entry".into(),
@@ -72,49 +60,23 @@ fn count(entries: usize) -> String {
 }
 
 /// A text in quotes, on one line and cut to a readable length.
-pub(super) fn quote(text: &str) -> String {
+fn quote(text: &str) -> String {
     format!("\"{}\"", cut(text))
 }
 
-/// A text on one line, cut to a readable length.
-fn cut(text: &str) -> String {
-    let mut characters = text.chars();
-    let head: String = characters.by_ref().take(LONGEST_QUOTE).collect();
-    let tail = if characters.next().is_some() {
-        "…"
-    } else {
-        ""
-    };
-    head.escape_debug().to_string() + tail
-}
-
 /// The word of a list that was probably meant.
-fn nearest(found: &str, words: &[&str]) -> Option<String> {
+pub(super) fn nearest<W: AsRef<str>>(found: &str, words: &[W]) -> Option<String> {
     if found.chars().count() > LONGEST_QUOTE {
         return None;
     }
     let found = found.to_lowercase();
+    let distance = |word: &str| strsim::damerau_levenshtein(&found, &word.to_lowercase());
     words
         .iter()
-        .map(|word| {
-            (
-                strsim::damerau_levenshtein(&found, &word.to_lowercase()),
-                word,
-            )
-        })
+        .map(|word| (distance(word.as_ref()), word.as_ref()))
         .min_by_key(|(distance, _)| *distance)
         .filter(|(distance, word)| *distance <= 1 + word.chars().count() / 4)
-        .map(|(_, word)| (*word).to_owned())
-}
-
-/// The error of a word outside a list of words, at no field yet.
-pub(super) fn choice(found: &str, words: &[&str]) -> ScenarioError {
-    ScenarioError::UnknownChoice {
-        field: String::new(),
-        nearest: nearest(found, words),
-        found: cut(found),
-        allowed: owned(words),
-    }
+        .map(|(_, word)| word.to_owned())
 }
 
 fn owned(words: &[&str]) -> Vec<String> {
@@ -374,7 +336,7 @@ impl<'de> Deserializer<'de> for Node {
             Self::Text(word) if variants.contains(&word.as_str()) => {
                 visitor.visit_enum(word.into_deserializer())
             }
-            Self::Text(word) => Err(Located(choice(&word, variants))),
+            Self::Text(word) => Err(Located(ScenarioError::choice(&word, variants))),
             node => node.refuse(format!("one of {}", variants.join(", "))),
         }
     }

@@ -1,8 +1,13 @@
 //! From text to a validated scenario, and back.
 
-use super::Scenario;
-use super::node::Node;
+mod node;
+#[cfg(test)]
+mod tests;
+mod untagged;
+
+use crate::scenario::Scenario;
 use crate::scenario::error::ScenarioError;
+use node::{Node, nearest};
 use serde::Deserialize;
 
 /// Longest TOML text read, in bytes. Its reader takes up to 240 bytes of memory for each, so that this bounds the
@@ -22,7 +27,7 @@ impl Scenario {
     pub fn from_toml(text: &str) -> Result<Self, ScenarioError> {
         let text = checked_text(text, LONGEST_TOML, LEAST_TOML)?;
         let node = toml::from_str(text).map_err(|error| toml_syntax(text, &error))?;
-        from_node(node, LEAST_TOML)
+        from_node(node, LEAST_TOML).map_err(with_nearest)
     }
 
     /// Reads and validates a scenario from JSON of the same structure; `null` stands for a field left out.
@@ -31,13 +36,21 @@ impl Scenario {
     pub fn from_json(text: &str) -> Result<Self, ScenarioError> {
         let text = checked_text(text, LONGEST_JSON, LEAST_JSON)?;
         let node = serde_json::from_str(text).map_err(|error| json_syntax(&error))?;
-        from_node(node, LEAST_JSON)
+        from_node(node, LEAST_JSON).map_err(with_nearest)
     }
 
     /// The scenario as JSON, with every default written out; a valid scenario reads back equal.
     pub fn to_json(&self) -> String {
         serde_json::to_string_pretty(self).expect("a scenario is plain data")
     }
+}
+
+/// The JSON Schema of [`Scenario`], as committed in `scenarios/scenario.schema.json`.
+pub fn json_schema() -> String {
+    let schema = schemars::schema_for!(Scenario);
+    let mut text = serde_json::to_string_pretty(&schema).expect("a schema is plain JSON");
+    text.push('\n');
+    text
 }
 
 /// The text without a byte order mark, refused where it is too long or blank.
@@ -76,6 +89,20 @@ fn from_node(node: Node, least: &str) -> Result<Scenario, ScenarioError> {
     })?;
     scenario.validate()?;
     Ok(scenario)
+}
+
+/// The same error with the word that was probably meant.
+fn with_nearest(mut error: ScenarioError) -> ScenarioError {
+    if let ScenarioError::UnknownChoice {
+        found,
+        nearest: meant,
+        allowed,
+        ..
+    } = &mut error
+    {
+        *meant = nearest(found, allowed);
+    }
+    error
 }
 
 fn toml_syntax(text: &str, error: &toml::de::Error) -> ScenarioError {

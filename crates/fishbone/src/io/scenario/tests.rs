@@ -1,26 +1,30 @@
 //! Facts of the schema: what is read, what is refused, and in which words.
 
 use super::*;
-use crate::scenario::error::ScenarioError;
+use crate::scenario::*;
 use approx::assert_relative_eq;
+use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_6};
 
 const SHIPPED: [(&str, &str); 5] = [
     (
         "example1",
-        include_str!("../../../../scenarios/example1.toml"),
+        include_str!("../../../../../scenarios/example1.toml"),
     ),
     (
         "example2",
-        include_str!("../../../../scenarios/example2.toml"),
+        include_str!("../../../../../scenarios/example2.toml"),
     ),
-    ("planar", include_str!("../../../../scenarios/planar.toml")),
+    (
+        "planar",
+        include_str!("../../../../../scenarios/planar.toml"),
+    ),
     (
         "polystyrene",
-        include_str!("../../../../scenarios/polystyrene.toml"),
+        include_str!("../../../../../scenarios/polystyrene.toml"),
     ),
-    ("twist", include_str!("../../../../scenarios/twist.toml")),
+    ("twist", include_str!("../../../../../scenarios/twist.toml")),
 ];
 
 /// A belt between two clamps with most sections written out, so that one edit reaches any field.
@@ -110,7 +114,7 @@ fn shipped_scenarios_are_valid_and_survive_a_round_trip() {
 
 #[test]
 fn scenarios_in_the_documentation_are_valid() {
-    let page = include_str!("../../../../docs/scenario.md");
+    let page = include_str!("../../../../../docs/scenario.md");
     let mut blocks = 0;
     for part in page.split("```toml\n").skip(1) {
         let (block, _) = part.split_once("```").unwrap();
@@ -122,7 +126,7 @@ fn scenarios_in_the_documentation_are_valid() {
 
 #[test]
 fn materials_in_the_documentation_are_those_of_the_code() {
-    let page = include_str!("../../../../docs/scenario.md");
+    let page = include_str!("../../../../../docs/scenario.md");
     for (name, material) in crate::board::material::PRESETS {
         let (young, poisson) = (material.young / 1e9, material.poisson);
         let density = material.density.unwrap();
