@@ -12,6 +12,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python -m pip --quiet --disable-pip-version-check
 CORE := python/fishbone/_core.abi3.so
+WASM := wasm32-unknown-unknown
 
 NEED_CARGO := @command -v cargo >/dev/null || { echo "fishbone needs cargo, which comes with Rust: https://rustup.rs" >&2; exit 1; }
 
@@ -31,7 +32,7 @@ demo: $(CORE)
 	@$(BIN)/fishbone solve scenarios/example1.toml --out out/example1.json --figure out/example1.png
 	@echo "out/example1.json and out/example1.png written"
 
-test: $(VENV)/.rust $(VENV)/.lint $(VENV)/.pytest
+test: $(VENV)/.rust $(VENV)/.wasm $(VENV)/.lint $(VENV)/.pytest
 	@echo "all tests pass"
 
 figures: $(CORE)
@@ -70,10 +71,23 @@ $(VENV)/.rust: $(VENV)/.packages $(RUST_SOURCES)
 	@echo "checking the Rust code"
 	@cargo fmt --all --check
 	@cargo clippy --quiet --locked --workspace --all-targets -- --deny warnings
+	@cargo clippy --quiet --locked --package fishbone --no-default-features --all-targets -- --deny warnings
 	@RUSTDOCFLAGS="--deny warnings" cargo doc --quiet --locked --no-deps --package fishbone --package stagewise
 	@echo "testing the Rust code"
 	@cargo test --quiet --locked --workspace
 	@touch $@
+
+# Where the target is missing no stamp is left, so that every run says so.
+$(VENV)/.wasm: $(VENV)/.packages $(RUST_SOURCES)
+	$(NEED_CARGO)
+	@if test -d "$$(rustc --print target-libdir --target $(WASM))"; then \
+	  echo "building the mechanics for $(WASM), without the feature io and with it"; \
+	  cargo build --quiet --locked --target $(WASM) --package fishbone --no-default-features && \
+	  cargo build --quiet --locked --target $(WASM) --package fishbone && \
+	  touch $@; \
+	else \
+	  echo "left out: building the mechanics for $(WASM); to have it: rustup target add $(WASM)"; \
+	fi
 
 $(VENV)/.lint: $(CORE) $(PYTHON_SOURCES)
 	@echo "checking the Python code"
