@@ -1,4 +1,4 @@
-"""The start of the core's own search (crates/fishbone/src/equilibrium/guess.rs) for a straight belt between two clamps, in NumPy.
+"""The start of the core's own search (its equilibrium/guess.rs) for a straight belt between two clamps, in NumPy.
 
 A plane arch over a uniform turn from frame to frame, of the height at which its ends are nearest to the clamps. It is
 found on a fine grid here and by a search in the core, so that the two starts differ by less than 1e-3.
