@@ -287,14 +287,18 @@ impl Even {
             cosine: [NOTHING; 3],
             cubic: [NOTHING; 3],
         };
-        let mut widest = 0.0;
-        for lane in 0..LANES {
+        let mut square = NOTHING;
+        for (lane, square) in square.iter_mut().enumerate() {
             let rotation = Magnus::at(spans, lane).rotation;
-            let square = dot(rotation, rotation);
-            widest = if square > widest { square } else { widest };
-            even.put(lane, &Coefficients::near(square));
+            *square = dot(rotation, rotation);
+            even.put(lane, &Coefficients::near(*square));
         }
-        if widest > 1.0 {
+        // Asked in a loop of its own: a loop that carries something from lane to lane is not vectorised.
+        let mut is_wide = false;
+        for square in square {
+            is_wide |= square > 1.0;
+        }
+        if is_wide {
             even.put_exact(spans);
         }
         even
