@@ -1,0 +1,70 @@
+"""Kernels that take several elements at a time are vectorised in the core that is installed.
+
+A branch in a lane, or a helper that is not inlined, makes the compiler take the lanes one after the other: no result
+changes, and the speed is gone. What the compiler has made of them is read off the core itself. That needs no clock and
+no second build, and it is what runs; assembly of the crate alone would be made before the optimisation of the whole.
+
+The core has no names of functions. Where they begin and end is in its tables for unwinding, and the kernels are told
+apart by what they do: the rest of the core is made for processors without AVX, so that an instruction that begins with
+v belongs to a kernel. Kernels of matrixmultiply fuse products with sums; those of this project never do, for results
+that are the same on every processor.
+"""
+
+from __future__ import annotations
+
+import bisect
+import platform
+import re
+import shutil
+import subprocess
+import sys
+from collections import Counter
+
+import pytest
+
+from fishbone import _core
+
+# As in `15fff0:  vmulpd %zmm1,%zmm2,%zmm3`.
+ARITHMETIC = re.compile(
+    r"^ *(?P<address>[0-9a-f]+):\s+v(?P<what>add|sub|mul|div|sqrt|fn?m\w+)(?P<kind>[ps]d)\s+(?P<operands>.*)",
+    re.MULTILINE,
+)
+START = re.compile(r"pc=([0-9a-f]+)\.\.")
+# Numbers that one instruction works on.
+WIDTHS = {"zmm": 8, "ymm": 4, "xmm": 2, "scalar": 1}
+
+
+def output(*command):
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+
+@pytest.fixture(scope="module")
+def kernels():
+    """Arithmetic instructions of each function that is made for AVX, by the registers that they work on."""
+    if sys.platform != "linux" or platform.machine() != "x86_64":
+        pytest.skip("instructions are known for x86_64 on Linux alone")
+    if not (shutil.which("objdump") and shutil.which("readelf")):
+        pytest.skip("objdump and readelf are not installed; they are in binutils")
+    starts = sorted(int(start, 16) for start in START.findall(output("readelf", "--debug-dump=frames", _core.__file__)))
+    found = {}
+    for line in ARITHMETIC.finditer(output("objdump", "-d", "--no-show-raw-insn", _core.__file__)):
+        start = bisect.bisect_right(starts, int(line["address"], 16)) - 1
+        registers = "scalar" if line["kind"] == "sd" else re.search("[xyz]mm", line["operands"])[0]
+        found.setdefault(start, Counter())["fused" if line["what"].startswith("f") else registers] += 1
+    return [counts for counts in found.values() if not counts["fused"]]
+
+
+@pytest.mark.parametrize(("registers", "more_than"), [("zmm", 150), ("ymm", 300)])
+def test_kernels_of_elements_take_all_lanes_at_a_time(kernels, registers, more_than):
+    # The motions and, for the source's energy and for the plate's, the derivatives; no other kernel has so much to do.
+    of_elements = [counts for counts in kernels if counts[registers] > more_than]
+    assert len(of_elements) == 3, kernels
+    # A loop that takes the lanes one by one is a few instructions here, and as many again for every lane when it runs.
+    assert all(set(counts) == {registers} for counts in of_elements), of_elements
+
+
+def test_kernels_of_stages_work_on_several_numbers_at_a_time(kernels):
+    for counts in kernels:
+        numbers = {registers: width * counts[registers] for registers, width in WIDTHS.items()}
+        # Of the elimination 0.07 is scalar: pivots are divided by one after the other.
+        assert numbers["scalar"] < 0.15 * sum(numbers.values()), counts
