@@ -1,5 +1,6 @@
 # make demo    solves example 1: the table here, out/example1.json and out/example1.png
 # make test    everything that must hold
+# make docs    the documents as a site: out/site/index.html
 # make wheel   a wheel that anyone can install, in dist; tried in an empty environment, without cargo
 # make figures draws the pictures of README.md and docs
 # make bench   measures how fast it is beside what one would use instead, and writes docs/performance.md
@@ -14,6 +15,7 @@ BIN := $(VENV)/bin
 PIP := PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python -m pip --quiet --disable-pip-version-check
 CORE := python/fishbone/_core.abi3.so
 WASM := wasm32-unknown-unknown
+SITE := out/site
 
 # Linked by zig, a wheel of Linux runs on systems from 2014 on; any other is for systems like this one.
 HOST = $(shell rustc -vV 2>/dev/null | sed -n 's/^host: //p')
@@ -24,9 +26,9 @@ NEED_CARGO := @command -v cargo >/dev/null || { echo "fishbone needs cargo, whic
 # What each step depends on, so that a second run does only what has changed.
 RUST_SOURCES := Cargo.toml Cargo.lock $(shell find crates scenarios -type f)
 PYTHON_SOURCES := pyproject.toml $(shell find python tests benchmarks docs -name '*.py' -o -name '*.pyi')
-TEXTS := $(shell find README.md docs scenarios tests -type f -not -name '*.pyc' 2>/dev/null)
+TEXTS := $(shell find *.md LICENSE CITATION.cff docs scenarios tests -type f -not -name '*.pyc' 2>/dev/null)
 
-.PHONY: help demo test wheel figures bench clean
+.PHONY: help demo test docs wheel figures bench clean
 .DELETE_ON_ERROR:
 
 help:
@@ -37,8 +39,19 @@ demo: $(CORE)
 	@$(BIN)/fishbone solve scenarios/example1.toml --out out/example1.json --figure out/example1.png
 	@echo "out/example1.json and out/example1.png written"
 
-test: $(VENV)/.rust $(VENV)/.wasm $(VENV)/.lint $(VENV)/.pytest
+test: $(VENV)/.rust $(VENV)/.wasm $(VENV)/.lint $(VENV)/.pytest $(SITE)/index.html
 	@echo "all tests pass"
+
+docs: $(SITE)/index.html
+	@echo "$< written"
+
+# Always from nothing: Sphinx warns of what is wrong with a page only when it reads it.
+$(SITE)/index.html: $(CORE) $(PYTHON_SOURCES) $(TEXTS)
+	@echo "building the documents"
+	@rm -rf $(SITE)
+	@$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going --conf-dir docs --doctree-dir $(SITE)/.doctrees . $(SITE)
+	@rm -r $(SITE)/.doctrees
+	@cp $(SITE)/README.html $@
 
 # By way of the source distribution, so that it is complete. No path of this machine stays in what is compiled.
 wheel: $(VENV)/.wheel
