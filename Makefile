@@ -1,5 +1,7 @@
 # make demo    solves example 1: the table here, out/example1.json and out/example1.png
 # make test    everything that must hold
+# make docs    the documents as a site: out/site/index.html
+# make wheel   a wheel that anyone can install, in dist; tried in an empty environment, without cargo
 # make figures draws the pictures of README.md and docs
 # make bench   measures how fast it is beside what one would use instead, and writes docs/performance.md
 # make clean   removes what these made
@@ -13,15 +15,20 @@ BIN := $(VENV)/bin
 PIP := PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python -m pip --quiet --disable-pip-version-check
 CORE := python/fishbone/_core.abi3.so
 WASM := wasm32-unknown-unknown
+SITE := out/site
+
+# Linked by zig, a wheel of Linux runs on systems from 2014 on; any other is for systems like this one.
+HOST = $(shell rustc -vV 2>/dev/null | sed -n 's/^host: //p')
+ZIG = $(if $(filter x86_64-unknown-linux-gnu aarch64-unknown-linux-gnu,$(HOST)),--zig --compatibility manylinux2014)
 
 NEED_CARGO := @command -v cargo >/dev/null || { echo "fishbone needs cargo, which comes with Rust: https://rustup.rs" >&2; exit 1; }
 
 # What each step depends on, so that a second run does only what has changed.
 RUST_SOURCES := Cargo.toml Cargo.lock $(shell find crates scenarios -type f)
 PYTHON_SOURCES := pyproject.toml $(shell find python tests benchmarks docs -name '*.py' -o -name '*.pyi')
-TEXTS := $(shell find README.md docs scenarios tests -type f -not -name '*.pyc' 2>/dev/null)
+TEXTS := $(shell find *.md LICENSE CITATION.cff docs scenarios tests -type f -not -name '*.pyc' 2>/dev/null)
 
-.PHONY: help demo test figures bench clean
+.PHONY: help demo test docs wheel figures bench clean
 .DELETE_ON_ERROR:
 
 help:
@@ -32,8 +39,35 @@ demo: $(CORE)
 	@$(BIN)/fishbone solve scenarios/example1.toml --out out/example1.json --figure out/example1.png
 	@echo "out/example1.json and out/example1.png written"
 
-test: $(VENV)/.rust $(VENV)/.wasm $(VENV)/.lint $(VENV)/.pytest
+test: $(VENV)/.rust $(VENV)/.wasm $(VENV)/.lint $(VENV)/.pytest $(SITE)/index.html
 	@echo "all tests pass"
+
+docs: $(SITE)/index.html
+	@echo "$< written"
+
+# Always from nothing: Sphinx warns of what is wrong with a page only when it reads it.
+$(SITE)/index.html: $(CORE) $(PYTHON_SOURCES) $(TEXTS)
+	@echo "building the documents"
+	@rm -rf $(SITE)
+	@$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going --conf-dir docs --doctree-dir $(SITE)/.doctrees . $(SITE)
+	@rm -r $(SITE)/.doctrees
+	@cp $(SITE)/README.html $@
+
+# By way of the source distribution, so that it is complete. No path of this machine stays in what is compiled.
+wheel: $(VENV)/.wheel
+	$(NEED_CARGO)
+	@echo "building a wheel (a few minutes the first time)"
+	@rm -rf dist
+	@cargo fetch --quiet --locked
+	@places="$$(rustc --print sysroot) $$(echo "$${CARGO_HOME:-$$HOME/.cargo}"/registry/src/*)"; \
+	RUSTFLAGS="$$(printf -- '--remap-path-prefix=%s= ' $$places)" PATH="$(CURDIR)/$(BIN):$$PATH" \
+	$(BIN)/maturin build --sdist --release $(ZIG) --target-dir target/wheel --out dist >$(VENV)/wheel.log 2>&1 \
+	|| { cat $(VENV)/wheel.log >&2; exit 1; }
+	@$(BIN)/python tests/wheel.py
+
+$(VENV)/.wheel: $(VENV)/.packages requirements-wheel.txt
+	@$(if $(ZIG),$(PIP) install --requirement requirements-wheel.txt,:)
+	@touch $@
 
 figures: $(CORE)
 	@PYTHONPATH=benchmarks $(BIN)/python docs/make_figures.py

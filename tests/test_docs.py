@@ -6,6 +6,7 @@ import re
 
 import pytest
 
+import fishbone as fb
 from conftest import ROOT
 
 PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -53,3 +54,9 @@ def test_pictures_are_small_and_used():
     for picture in (ROOT / "docs" / "figures").iterdir():
         assert picture.stat().st_size < LARGEST_PICTURE
         assert f"figures/{picture.name})" in text
+
+
+def test_the_reference_has_all_names():
+    text = "".join(page.read_text() for page in (ROOT / "docs" / "python").iterdir())
+    documented = re.findall(r"^\.\. auto(?:function|class|exception):: (\w+)$", text, re.MULTILINE)
+    assert sorted(documented) == sorted(set(fb.__all__) - {"__version__"})
