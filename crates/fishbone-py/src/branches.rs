@@ -2,7 +2,7 @@
 
 use crate::equilibrium::{Equilibrium, SIGNAL_INTERVAL};
 use crate::scenario::Scenario;
-use fishbone::analysis::branches::{self as core, Watch};
+use fishbone::analysis::branches::{self as core, SearchSettings, Watch};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
@@ -35,14 +35,24 @@ impl Watch for Counter {
 /// Finds the equilibria of a scenario over all cores with the GIL released; `progress(done, planned)` is called now and then
 /// from the calling thread.
 ///
+/// `budget` is the largest numbers of sums of waves to start from, of minima to perturb and of equilibria to continue, where
+/// these are to be fewer than usual: a search of moments, which may miss some.
+///
 /// Errors: whatever `progress` or a signal handler raises; the search then ends.
 #[pyfunction]
-#[pyo3(signature = (scenario, progress=None))]
+#[pyo3(signature = (scenario, progress=None, budget=None))]
 pub(crate) fn branches(
     py: Python<'_>,
     scenario: &Scenario,
     progress: Option<Py<PyAny>>,
+    budget: Option<(usize, usize, usize)>,
 ) -> PyResult<Vec<Equilibrium>> {
+    let mut settings = SearchSettings::default();
+    if let Some((sums, perturbed, continued)) = budget {
+        settings.sums = sums;
+        settings.perturbed = perturbed;
+        settings.continued = continued;
+    }
     let counter = Counter::default();
     py.detach(|| {
         thread::scope(|scope| {
@@ -50,7 +60,7 @@ pub(crate) fn branches(
                 let run = |count: usize, task: &(dyn Fn(usize) + Sync)| {
                     (0..count).into_par_iter().for_each(task);
                 };
-                core::branches(&scenario.0, &run, &counter)
+                core::branches(&scenario.0, &settings, &run, &counter)
             });
             let mut waited = Ok(());
             while waited.is_ok() && !search.is_finished() {

@@ -5,6 +5,7 @@ use crate::errors::raised;
 use crate::scenario::Scenario;
 use crate::sensitivity::Sensitivity;
 use crate::tracker::Tracker;
+use fishbone::analysis::margin::MarginSettings;
 use fishbone::board::curve::Curve;
 use fishbone::equilibrium;
 use fishbone::geometry::Wrench;
@@ -473,14 +474,11 @@ impl Equilibrium {
     ) -> PyResult<Option<Margin>> {
         let mut signals = Signals::new();
         let margin = py.detach(|| {
+            let (solved, settings) = (&self.solved, MarginSettings::default());
             let proceed = &mut || signals.proceed();
-            match direction {
-                Some(direction) => {
-                    let direction = Vector6::from(direction);
-                    self.solved
-                        .margin_along(support, &direction, reach, proceed)
-                }
-                None => self.solved.margin(support, reach, proceed),
+            match direction.map(Vector6::from) {
+                Some(along) => solved.margin_along(support, &along, reach, &settings, proceed),
+                None => solved.margin(support, reach, &settings, proceed),
             }
         });
         if let Some(error) = signals.raised {

@@ -24,18 +24,138 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// A mode of the programme.
 type Mode = stagewise::Mode<8>;
 
-/// Most minima that are perturbed.
-const PERTURBED: usize = 96;
-/// Modes along which a minimum is perturbed.
-const PERTURBED_MODES: usize = 4;
-/// Most equilibria that are continued in modal loads.
-const CONTINUED: usize = 16;
-/// Equilibria continued at a time, so that lower ones that are found meanwhile come first.
-const AT_A_TIME: usize = 4;
-/// Most negative modes of an equilibrium that is reported.
-const HIGHEST_INDEX: usize = 2;
-/// Modes along which an equilibrium is loaded, by its number of negative modes.
-const LOADED_MODES: [usize; HIGHEST_INDEX + 1] = [6, 4, 0];
+/// What the search does, and what it takes for the same; by default what finds all that is known to be there.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SearchSettings {
+    /// Waves of bend, laid over every arch and the straight belt; amplitudes in 1/U.
+    pub bend_waves: Vec<Wave>,
+    /// Waves of rib slope, each laid over with every wave of bend; amplitudes, a number.
+    pub slope_waves: Vec<Wave>,
+    /// Sums of waves from which the search starts as well, a number.
+    pub sums: usize,
+    /// Minima that are perturbed, the largest number.
+    pub perturbed: usize,
+    /// Modes along which a minimum is perturbed, a number.
+    pub perturbed_modes: usize,
+    /// Displacements of a minimum along each of these, in norms of the mode.
+    pub perturbations: Vec<f64>,
+    /// Equilibria that are continued in modal loads, the largest number.
+    pub continued: usize,
+    /// Equilibria continued at a time, so that lower ones that are found meanwhile come first; a number.
+    pub at_a_time: usize,
+    /// Modes along which an equilibrium is loaded, by its number of negative modes; one of more is not reported; a number each.
+    pub loaded_modes: [usize; 3],
+    /// Displacement from a saddle along its lowest mode, from where it is downhill, in norms of the mode.
+    pub off_saddle: f64,
+    /// Elements of the mesh that confirms an equilibrium, in those of the scenario.
+    pub refinement: usize,
+    /// Difference of energy up to which two equilibria on one mesh may be the same, a share.
+    pub same_level: f64,
+    /// Distance of nodes up to which two equilibria on one mesh may be the same, in U.
+    pub same_distance: f64,
+    /// Difference of energy up to which two equilibria on different meshes may be the same, a share.
+    pub like_level: f64,
+    /// Distance of nodes up to which two equilibria on different meshes may be the same, in U.
+    pub like_distance: f64,
+    /// Bending energy of a belt that counts as flat, in the scenario's unit of energy.
+    pub flat_energy: f64,
+    /// Bulge by which one mirror image is the higher, in U.
+    pub higher: f64,
+    /// Miss of the supports up to which a mirror image meets them, lengths in U and angles in rad.
+    pub miss: f64,
+}
+
+/// A wave along the belt.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wave {
+    /// Half waves over the length of the belt, a number.
+    pub half_waves: f64,
+    /// Largest value, in the unit of what waves.
+    pub amplitude: f64,
+}
+
+impl Default for SearchSettings {
+    fn default() -> Self {
+        let waves = |waves: &[(f64, f64)]| {
+            let wave = |&(half_waves, amplitude)| Wave {
+                half_waves,
+                amplitude,
+            };
+            waves.iter().map(wave).collect()
+        };
+        Self {
+            bend_waves: waves(&[
+                (0.0, 0.0),
+                (0.0, 4.0),
+                (0.0, -4.0),
+                (1.0, 4.0),
+                (1.0, -4.0),
+                (2.0, 8.0),
+                (2.0, -8.0),
+                (3.0, 12.0),
+                (3.0, -12.0),
+            ]),
+            slope_waves: waves(&[(1.0, 0.0), (1.0, 0.5), (1.0, -0.5), (2.0, 0.5), (2.0, -0.5)]),
+            sums: 4000,
+            perturbed: 96,
+            perturbed_modes: 4,
+            perturbations: vec![0.1, -0.1, 0.3, -0.3],
+            continued: 16,
+            at_a_time: 4,
+            loaded_modes: [6, 4, 0],
+            off_saddle: 0.01,
+            refinement: 2,
+            same_level: 1e-4,
+            same_distance: SAME,
+            like_level: 0.02,
+            like_distance: 0.03,
+            flat_energy: 1e-6,
+            higher: 1e-9,
+            miss: 1e-6,
+        }
+    }
+}
+
+impl SearchSettings {
+    /// Most negative modes of an equilibrium that is reported.
+    fn highest_index(&self) -> usize {
+        self.loaded_modes.len() - 1
+    }
+
+    /// Whether two equilibria are the same but for a symmetry.
+    fn is_same(&self, a: &Equilibrium, b: &Equilibrium) -> bool {
+        self.is_within(a, b, self.same_level, self.same_distance)
+    }
+
+    /// Whether two equilibria may be the same but for a symmetry and the mesh.
+    fn is_like(&self, a: &Equilibrium, b: &Equilibrium) -> bool {
+        self.is_within(a, b, self.like_level, self.like_distance)
+    }
+
+    /// Whether two equilibria differ by no more than a share of the energy and a distance in U, and in no number of negative
+    /// modes.
+    fn is_within(&self, a: &Equilibrium, b: &Equilibrium, share: f64, distance: f64) -> bool {
+        let solved = || Some((a.solved.as_ref()?, b.solved.as_ref()?));
+        let is_level = (a.energy - b.energy).abs() <= share * self.size(a).max(self.size(b));
+        let index = |e: &Equilibrium| e.stability.map(|s| s.negative_modes);
+        is_level
+            && index(a) == index(b)
+            && solved()
+                .is_some_and(|(a, b)| are_twins(&a.at.point.poses, &b.at.point.poses, distance))
+    }
+
+    /// What differences of energy are measured by: that of bending, as the zero of a load's potential is anywhere; of a flat
+    /// belt next to nothing.
+    fn size(&self, equilibrium: &Equilibrium) -> f64 {
+        let unit = equilibrium.problem.units().energy;
+        equilibrium.elastic_energy.max(self.flat_energy * unit)
+    }
+
+    /// Whether one of two mirror images bulges more as the scenario asks.
+    fn is_higher(&self, one: &Equilibrium, other: &Equilibrium) -> bool {
+        height(one) > height(other) + self.higher * one.spine.length()
+    }
+}
 
 /// Runs `task(i)` for every i below a number, in any order and on any thread.
 pub type Run<'a> = dyn Fn(usize, &(dyn Fn(usize) + Sync)) + 'a;
@@ -60,7 +180,12 @@ pub fn one_by_one(count: usize, task: &(dyn Fn(usize) + Sync)) {
 /// Of shapes that are mirror images of each other the one is reported that bulges as the scenario asks. The same input gives
 /// the same output, whatever runs the tasks. Where nothing is found, the outcome of a solve is reported, whose message gives
 /// the reason.
-pub fn branches(problem: &Problem, run: &Run, watch: &dyn Watch) -> Vec<Equilibrium> {
+pub fn branches(
+    problem: &Problem,
+    settings: &SearchSettings,
+    run: &Run,
+    watch: &dyn Watch,
+) -> Vec<Equilibrium> {
     let proceed = &mut || watch.proceed();
     let first = crate::solve::solve(problem, proceed);
     let is_intrinsic = problem.scenario().solver.method == Method::Intrinsic;
@@ -69,6 +194,7 @@ pub fn branches(problem: &Problem, run: &Run, watch: &dyn Watch) -> Vec<Equilibr
     }
     let mut census = Census {
         problem,
+        settings,
         run,
         watch,
         found: Vec::new(),
@@ -92,6 +218,7 @@ pub fn branches(problem: &Problem, run: &Run, watch: &dyn Watch) -> Vec<Equilibr
 /// What has been found so far.
 struct Census<'a> {
     problem: &'a Problem,
+    settings: &'a SearchSettings,
     run: &'a Run<'a>,
     watch: &'a dyn Watch,
     found: Vec<Equilibrium>,
@@ -119,17 +246,19 @@ impl Census<'_> {
 
     /// Enters an equilibrium unless it is known or has too many negative modes; of mirror images the higher.
     fn enter(&mut self, equilibrium: Equilibrium) {
-        if equilibrium.status != Status::Converged || index(&equilibrium) > HIGHEST_INDEX {
+        let settings = self.settings;
+        if equilibrium.status != Status::Converged || index(&equilibrium) > settings.highest_index()
+        {
             return;
         }
         let same = self
             .found
             .iter_mut()
-            .find(|known| is_same(known, &equilibrium));
+            .find(|known| settings.is_same(known, &equilibrium));
         match same {
             None => self.found.push(equilibrium),
             Some(known) => {
-                if height(&equilibrium) > height(known) + 1e-9 * equilibrium.spine.length() {
+                if settings.is_higher(&equilibrium, known) {
                     *known = equilibrium;
                 }
             }
@@ -148,7 +277,11 @@ impl Census<'_> {
         let before = known.len();
         for equilibrium in found {
             let is_enough = known.len() == before + most;
-            if !is_enough && !known.iter().any(|known| is_like(known, equilibrium)) {
+            if !is_enough
+                && !known
+                    .iter()
+                    .any(|known| self.settings.is_like(known, equilibrium))
+            {
                 known.push(equilibrium.clone());
             }
         }
@@ -158,7 +291,7 @@ impl Census<'_> {
     /// Minimises from many starts.
     fn start(&mut self) {
         let problem = self.problem;
-        let starts = starts::starts(problem);
+        let starts = starts::starts(problem, self.settings);
         let watch = self.watch;
         let found = self.each(&starts, |start| {
             minimum_from(problem, start, &mut || watch.proceed())
@@ -174,15 +307,16 @@ impl Census<'_> {
         let mut perturbed = Vec::new();
         loop {
             let is_minimum = |e: &Equilibrium| e.stable() == Some(true);
-            let most = PERTURBED - perturbed.len();
+            let most = self.settings.perturbed - perturbed.len();
             let next = self.lowest_unlike(&mut perturbed, most, is_minimum);
             if next.is_empty() {
                 return;
             }
-            let (problem, watch) = (self.problem, self.watch);
+            let (problem, settings, watch) = (self.problem, self.settings, self.watch);
             let found = self.each(&next, |minimum| {
-                let modes = lowest_modes(minimum, PERTURBED_MODES);
-                let perturb = |mode: &Mode| perturbed_along(problem, minimum, mode, watch);
+                let modes = lowest_modes(minimum, settings.perturbed_modes);
+                let perturb =
+                    |mode: &Mode| perturbed_along(problem, settings, minimum, mode, watch);
                 modes.iter().flat_map(perturb).collect::<Vec<_>>()
             });
             for equilibrium in found.into_iter().flatten() {
@@ -195,16 +329,15 @@ impl Census<'_> {
     fn load(&mut self) {
         let mut continued = Vec::new();
         loop {
-            let most = AT_A_TIME.min(CONTINUED - continued.len());
+            let settings = self.settings;
+            let most = settings.at_a_time.min(settings.continued - continued.len());
             let next = self.lowest_unlike(&mut continued, most, |_| true);
             if next.is_empty() {
                 return;
             }
             let modes = self.each(&next, |equilibrium| {
-                lowest_modes(
-                    equilibrium,
-                    LOADED_MODES[index(equilibrium).min(HIGHEST_INDEX)],
-                )
+                let index = index(equilibrium).min(settings.highest_index());
+                lowest_modes(equilibrium, settings.loaded_modes[index])
             });
             let tasks: Vec<_> = next
                 .iter()
@@ -216,7 +349,7 @@ impl Census<'_> {
                 .collect();
             let (problem, watch) = (self.problem, self.watch);
             let found = self.each(&tasks, |(equilibrium, mode, forth)| {
-                beyond_modal_load(problem, equilibrium, mode, *forth, watch)
+                beyond_modal_load(problem, settings, equilibrium, mode, *forth, watch)
             });
             for equilibrium in found.into_iter().flatten() {
                 self.enter(equilibrium);
@@ -228,9 +361,9 @@ impl Census<'_> {
     fn confirm(&mut self) {
         let mut found = std::mem::take(&mut self.found);
         found.sort_by(|a, b| a.energy.total_cmp(&b.energy));
-        let watch = self.watch;
+        let (settings, watch) = (self.settings, self.watch);
         let fine = self.each(&found, |found| {
-            on_finer_mesh(found, &mut || watch.proceed())
+            on_finer_mesh(settings, found, &mut || watch.proceed())
         });
         let mut known: Vec<(Equilibrium, f64)> = Vec::new();
         for (found, fine) in found.into_iter().zip(fine) {
@@ -240,7 +373,7 @@ impl Census<'_> {
             let change = (fine.energy - found.energy).abs();
             let is_known = |(known, own): &(Equilibrium, f64)| {
                 let is_level = (known.energy - fine.energy).abs() <= change.max(*own);
-                is_same(known, &fine) || (is_level && is_like(known, &fine))
+                settings.is_same(known, &fine) || (is_level && settings.is_like(known, &fine))
             };
             if !known.iter().any(is_known) {
                 known.push((fine, change));
@@ -252,20 +385,20 @@ impl Census<'_> {
     /// Takes the mirror image of a minimum for it, where that meets the supports too and bulges more as asked.
     fn face(&mut self) {
         let found = std::mem::take(&mut self.found);
-        let watch = self.watch;
+        let (settings, watch) = (self.settings, self.watch);
         self.found = self.each(&found, |found| {
-            facing(found, &mut || watch.proceed()).unwrap_or_else(|| found.clone())
+            facing(settings, found, &mut || watch.proceed()).unwrap_or_else(|| found.clone())
         });
     }
 }
 
 /// The mirror image that bulges most, where it does so more than the minimum itself.
 fn facing(
+    settings: &SearchSettings,
     found: &Equilibrium,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Option<Equilibrium> {
-    /// Largest miss of the supports, lengths in U and angles in rad, that is rounding.
-    const ROUNDING: f64 = 1e-6;
+    /// Mirrors: signs of bend and of rib slope.
     const MIRRORS: [[f64; 2]; 3] = [[-1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]];
     let solved = found.solved.as_ref()?;
     let stable = found.stability.is_none_or(|s| s.negative_modes == 0);
@@ -278,25 +411,27 @@ fn facing(
                 *fields = Vector2::new(bend * fields[0], slope * fields[1]);
             }
             solved.program.settle(&mut point);
-            let meets = solved.program.miss_of_supports(&point) < ROUNDING;
+            let meets = solved.program.miss_of_supports(&point) < settings.miss;
             meets.then_some(point)
         });
     let images = mirrored.filter_map(|point| {
         let image = minimum_next_to(&found.problem, &point, proceed);
-        (image.status == Status::Converged && is_same(found, &image)).then_some(image)
+        (image.status == Status::Converged && settings.is_same(found, &image)).then_some(image)
     });
     let highest = images.max_by(|a, b| height(a).total_cmp(&height(b)))?;
-    (height(&highest) > height(found) + 1e-9 * found.spine.length()).then_some(highest)
+    settings.is_higher(&highest, found).then_some(highest)
 }
 
 /// The same equilibrium on a mesh twice as fine; `None` where there is none like it.
 fn on_finer_mesh(
+    settings: &SearchSettings,
     found: &Equilibrium,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Option<Equilibrium> {
-    let fine = found.refined(2 * found.problem.elements(), proceed)?;
-    let is_level = (fine.energy - found.energy).abs() <= LEVEL * size(found);
-    (is_level && found.displacement(&fine) <= NEAR).then_some(fine)
+    let fine = found.refined(settings.refinement * found.problem.elements(), proceed)?;
+    let change = (fine.energy - found.energy).abs();
+    let is_level = change <= settings.like_level * settings.size(found);
+    (is_level && found.displacement(&fine) <= settings.like_distance).then_some(fine)
 }
 
 /// The lowest modes of an equilibrium.
@@ -311,16 +446,16 @@ fn lowest_modes(equilibrium: &Equilibrium, count: usize) -> Vec<Mode> {
 /// The minima that are found from where a minimum has been displaced far along a mode.
 fn perturbed_along(
     problem: &Problem,
+    settings: &SearchSettings,
     from: &Equilibrium,
     mode: &Mode,
     watch: &dyn Watch,
 ) -> Vec<Equilibrium> {
-    const FAR: [f64; 4] = [0.1, -0.1, 0.3, -0.3];
-    let solved = from.solved.iter();
-    let starts = solved.flat_map(|solved| {
-        FAR.map(|far| stagewise::moved(&solved.program, &solved.at.point, mode, far))
-    });
-    starts
+    let Some(solved) = &from.solved else {
+        return Vec::new();
+    };
+    let far = settings.perturbations.iter();
+    far.map(|far| stagewise::moved(&solved.program, &solved.at.point, mode, *far))
         .map(|start| minimum_from(problem, &start, &mut || watch.proceed()))
         .collect()
 }
@@ -328,6 +463,7 @@ fn perturbed_along(
 /// The equilibrium that a modal load leads to and, where that is a saddle, the minima downhill on either side.
 fn beyond_modal_load(
     problem: &Problem,
+    settings: &SearchSettings,
     from: &Equilibrium,
     mode: &Mode,
     forth: bool,
@@ -343,7 +479,7 @@ fn beyond_modal_load(
     let Some(other) = other else {
         return Vec::new();
     };
-    let mut found = downhill(problem, program, &other, watch);
+    let mut found = downhill(problem, settings, program, &other, watch);
     if is_settled(problem, program, &other.point) {
         let solution = stagewise::assess(program, tolerance, &other);
         found.push(of_solution(problem, program.clone(), solution));
@@ -354,15 +490,16 @@ fn beyond_modal_load(
 /// The minima downhill from a saddle, to either side along its lowest mode.
 fn downhill(
     problem: &Problem,
+    settings: &SearchSettings,
     program: &BeltProgram,
     saddle: &Stationary<BeltPoint>,
     watch: &dyn Watch,
 ) -> Vec<Equilibrium> {
-    const OFF: f64 = 0.01;
+    let off = settings.off_saddle;
     let modes = stagewise::lowest_modes(program, &mut saddle.clone(), 1).unwrap_or_default();
     let falling = modes.into_iter().filter(|mode| mode.eigenvalue < 0.0);
     let sides = falling.flat_map(|mode| {
-        [OFF, -OFF].map(|off| stagewise::moved(program, &saddle.point, &mode, off))
+        [off, -off].map(|off| stagewise::moved(program, &saddle.point, &mode, off))
     });
     sides
         .map(|side| minimum_from(problem, &side, &mut || watch.proceed()))
@@ -373,39 +510,6 @@ fn downhill(
 fn index(equilibrium: &Equilibrium) -> usize {
     equilibrium.stability.map_or(0, |s| s.negative_modes)
 }
-
-/// What differences of energy are measured by: that of bending, as the zero of a load's potential is anywhere; of a flat belt
-/// next to nothing.
-fn size(equilibrium: &Equilibrium) -> f64 {
-    const FLAT: f64 = 1e-6;
-    let unit = equilibrium.problem.units().energy;
-    equilibrium.elastic_energy.max(FLAT * unit)
-}
-
-/// Whether two equilibria are the same but for a symmetry.
-fn is_same(a: &Equilibrium, b: &Equilibrium) -> bool {
-    const SAME_LEVEL: f64 = 1e-4;
-    is_within(a, b, SAME_LEVEL, SAME)
-}
-
-/// Whether two equilibria may be the same but for a symmetry and the mesh.
-fn is_like(a: &Equilibrium, b: &Equilibrium) -> bool {
-    is_within(a, b, LEVEL, NEAR)
-}
-
-/// Whether two equilibria differ by no more than a share of the energy and a distance in U, and in no number of negative modes.
-fn is_within(a: &Equilibrium, b: &Equilibrium, share: f64, distance: f64) -> bool {
-    let solved = || Some((a.solved.as_ref()?, b.solved.as_ref()?));
-    let is_level = (a.energy - b.energy).abs() <= share * size(a).max(size(b));
-    let index = |e: &Equilibrium| e.stability.map(|s| s.negative_modes);
-    is_level
-        && index(a) == index(b)
-        && solved().is_some_and(|(a, b)| are_twins(&a.at.point.poses, &b.at.point.poses, distance))
-}
-
-/// With energies that differ by more than this share, or farther off, in U, two are not the same on different meshes.
-const LEVEL: f64 = 0.02;
-const NEAR: f64 = 0.03;
 
 /// How far an equilibrium bulges as its scenario asks.
 fn height(equilibrium: &Equilibrium) -> f64 {

@@ -30,6 +30,45 @@ pub struct Margin {
     pub rotation: Vector3<f64>,
 }
 
+/// How hard the nearest loss of stability is looked for, and what is taken for near, far and the same.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MarginSettings {
+    /// Nearest places on the boundary from which the search goes on, the largest number.
+    pub refined: usize,
+    /// Distance up to which others are looked for to go on from, in that of the nearest place that is known.
+    pub farther: f64,
+    /// Turns to the side of a way that ends where others branch off, in rad where small.
+    pub aside: [f64; 2],
+    /// Rounds along the boundary's normal from each place, the largest number.
+    pub rounds: usize,
+    /// Deviation of the normal from the way that was taken at which these are the same, 1 − cos of the angle.
+    pub same_way: f64,
+    /// Step of the differences by which eigenvalues fall, in U and rad.
+    pub difference: f64,
+    /// Turn of a leg, less than half a turn, in rad.
+    pub leg: f64,
+    /// Step along a way, the longest, in U and rad.
+    pub step: f64,
+    /// States along a way, the largest number.
+    pub states: usize,
+}
+
+impl Default for MarginSettings {
+    fn default() -> Self {
+        Self {
+            refined: 4,
+            farther: 2.0,
+            aside: [0.3, -0.3],
+            rounds: 16,
+            same_way: 1e-6,
+            difference: 1e-3,
+            leg: 3.0,
+            step: 0.05,
+            states: 1000,
+        }
+    }
+}
+
 /// Why there is no margin.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
@@ -90,9 +129,11 @@ impl Equilibrium {
         support: usize,
         direction: &Vector6<f64>,
         reach: f64,
+        settings: &MarginSettings,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Result<Option<Margin>, NoMargin> {
-        let found = self.boundary(support, &direction.normalize(), reach, proceed)?;
+        let direction = direction.normalize();
+        let found = self.boundary(support, &direction, reach, settings, proceed)?;
         Ok(found.map(|boundary| boundary.margin))
     }
 
@@ -107,21 +148,17 @@ impl Equilibrium {
         &self,
         support: usize,
         reach: f64,
+        settings: &MarginSettings,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Result<Option<Margin>, NoMargin> {
-        /// From so many of the nearest places the search goes on.
-        const REFINED: usize = 4;
-        /// As many times as far as the nearest place that is known it looks for others to go on from.
-        const FARTHER: f64 = 2.0;
-        /// So much to the side of a way that ends where others branch off.
-        const ASIDE: [f64; 2] = [0.3, -0.3];
         let axes = (0..6).flat_map(|axis| [1.0, -1.0].map(|sign| sign * Vector6::ith(axis, 1.0)));
-        let steepest = self.falls(support, proceed)?;
+        let steepest = self.falls(support, settings, proceed)?;
         let mut found = Vec::new();
         let mut lost = None;
         let mut look = |direction: &Vector6<f64>, found: &mut Vec<Boundary>| {
-            let nearest = found.first().map_or(reach, |b| FARTHER * b.margin.distance);
-            match self.boundary(support, direction, nearest.min(reach), proceed) {
+            let farther = |nearest: &Boundary| settings.farther * nearest.margin.distance;
+            let far = found.first().map_or(reach, farther).min(reach);
+            match self.boundary(support, direction, far, settings, proceed) {
                 Ok(boundary) => found.extend(boundary),
                 Err(NoMargin::Lost(share)) => lost = Some(share),
                 Err(other) => return Err(other),
@@ -133,10 +170,14 @@ impl Equilibrium {
             look(&direction, &mut found)?;
         }
         // Where others branch off, the boundary has an edge: folds lie nearer to either side of it.
-        let edges = found.iter().filter(|b| !b.margin.is_fold).take(REFINED);
+        let edges = found
+            .iter()
+            .filter(|b| !b.margin.is_fold)
+            .take(settings.refined);
         let beside = |edge: &Boundary| {
             let across = edge.across?;
-            Some(ASIDE.map(|aside| (edge.margin.direction + aside * across).normalize()))
+            let aside = settings.aside;
+            Some(aside.map(|aside| (edge.margin.direction + aside * across).normalize()))
         };
         let sides: Vec<_> = edges.filter_map(beside).flatten().collect();
         for direction in sides {
@@ -145,10 +186,10 @@ impl Equilibrium {
         if let (true, Some(share)) = (found.is_empty(), lost) {
             return Err(NoMargin::Lost(share));
         }
-        found.truncate(REFINED);
+        found.truncate(settings.refined);
         let mut margins = Vec::new();
         for boundary in found {
-            margins.push(self.nearest_from(support, boundary, proceed)?);
+            margins.push(self.nearest_from(support, boundary, settings, proceed)?);
         }
         Ok(margins
             .into_iter()
@@ -160,22 +201,22 @@ impl Equilibrium {
         &self,
         support: usize,
         mut best: Boundary,
+        settings: &MarginSettings,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Result<Margin, NoMargin> {
-        const ROUNDS: usize = 16;
-        const SAME: f64 = 1e-6;
-        for _ in 0..ROUNDS {
+        for _ in 0..settings.rounds {
             let Some(normal) = best.across.filter(|_| best.margin.is_fold) else {
                 break;
             };
             let towards = normal * normal.dot(&best.margin.direction).signum();
-            if 1.0 - towards.dot(&best.margin.direction) < SAME {
+            if 1.0 - towards.dot(&best.margin.direction) < settings.same_way {
                 break;
             }
             // All the way, or half of it where that leads to no nearer place.
             let mut nearer = None;
             for way in [towards, (towards + best.margin.direction).normalize()] {
-                nearer = match self.boundary(support, &way, best.margin.distance, proceed) {
+                let far = best.margin.distance;
+                nearer = match self.boundary(support, &way, far, settings, proceed) {
                     Ok(found) => found,
                     Err(NoMargin::Lost(_)) => None,
                     Err(other) => return Err(other),
@@ -196,15 +237,17 @@ impl Equilibrium {
     fn falls(
         &self,
         support: usize,
+        settings: &MarginSettings,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Result<Vec<Vector6<f64>>, NoMargin> {
-        const STEP: f64 = 1e-3;
+        /// Lowest eigenvalues of which each gives a direction, a number.
         const LOWEST: usize = 2;
         let mut gradients = [Vector6::zeros(); LOWEST];
         for axis in 0..6 {
             let mut values = [[0.0; LOWEST]; 2];
             for (sign, values) in [1.0, -1.0].into_iter().zip(&mut values) {
-                let way = Way::new(self, support, &(sign * Vector6::ith(axis, 1.0)), STEP)?;
+                let direction = sign * Vector6::ith(axis, 1.0);
+                let way = Way::new(self, support, &direction, settings.difference, settings)?;
                 let solved = self.certified()?;
                 let continuation = way.continuation();
                 let modes = continuation
@@ -234,9 +277,10 @@ impl Equilibrium {
         support: usize,
         direction: &Vector6<f64>,
         reach: f64,
+        settings: &MarginSettings,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Result<Option<Boundary>, NoMargin> {
-        let way = Way::new(self, support, direction, reach)?;
+        let way = Way::new(self, support, direction, reach, settings)?;
         let solved = self.certified()?;
         let continuation = way.continuation();
         let start = continuation.start(&solved.at, 0.0, true);
@@ -294,6 +338,7 @@ struct Way {
     direction: Vector6<f64>,
     /// U.
     length: f64,
+    pace: Pace,
 }
 
 impl Way {
@@ -303,8 +348,8 @@ impl Way {
         support: usize,
         direction: &Vector6<f64>,
         reach: f64,
+        settings: &MarginSettings,
     ) -> Result<Self, NoMargin> {
-        const LEG: f64 = 3.0;
         let solved = equilibrium.certified()?;
         if equilibrium.stable() != Some(true) {
             return Err(NoMargin::NotStable);
@@ -313,7 +358,7 @@ impl Way {
         let from = problem.clamp(support);
         let from = from.ok_or(NoMargin::NotClamped(support))?;
         let length = problem.units().length;
-        let legs = (reach * direction.fixed_rows::<3>(3).norm() / LEG)
+        let legs = (reach * direction.fixed_rows::<3>(3).norm() / settings.leg)
             .ceil()
             .max(1.0);
         let ends = (1..=legs as usize).map(|leg| {
@@ -328,6 +373,11 @@ impl Way {
             from,
             direction: *direction,
             length,
+            pace: Pace {
+                longest: settings.step,
+                stations: settings.states,
+                events: Events::EndAtFirst,
+            },
         })
     }
 
@@ -337,13 +387,8 @@ impl Way {
     }
 
     fn continuation(&self) -> Continuation<'_, Self, 6, 2, 8> {
-        const PACE: Pace = Pace {
-            longest: 0.05,
-            stations: 1000,
-            events: Events::EndAtFirst,
-        };
         let tolerance = self.path.base().tolerance();
-        Continuation::new(self, tolerance, [0.0, self.path.length()], PACE)
+        Continuation::new(self, tolerance, [0.0, self.path.length()], self.pace)
     }
 
     /// Whether the ribs are held by the edges that they reach, and by no other.

@@ -1,5 +1,6 @@
 //! Where the search for all equilibria starts.
 
+use super::{SearchSettings, Wave};
 use crate::equilibrium::guess::{guess, waved};
 use crate::problem::Problem;
 use crate::problem::program::BeltPoint;
@@ -8,47 +9,40 @@ use std::f64::consts::PI;
 
 /// Shapes from which to search: arches to both sides and the straight belt with waves of bend and of rib slope over them,
 /// then sums of waves that cover the space of such sums evenly.
-pub(super) fn starts(problem: &Problem) -> Vec<BeltPoint> {
+pub(super) fn starts(problem: &Problem, settings: &SearchSettings) -> Vec<BeltPoint> {
     let program = problem.program(problem.elements());
     let bulge = problem.bulge();
     let [up, down] = [bulge, -bulge].map(|bulge| guess(&program, &bulge));
     let mut starts = Vec::new();
     for (base, kept) in [(&up, 1.0), (&down, 1.0), (&up, 0.0)] {
-        for (bend_waves, bend) in BENDS {
-            for (slope_waves, slope) in SLOPES {
+        for bend in &settings.bend_waves {
+            for slope in &settings.slope_waves {
                 starts.push(waved(&program, base, kept, &|u| {
-                    Vector2::new(
-                        bend * (PI * bend_waves * u).cos(),
-                        slope * (PI * slope_waves * u).sin(),
-                    )
+                    Vector2::new(bend.even_at(u), slope.odd_at(u))
                 }));
             }
         }
     }
-    starts.extend((0..SUMS).map(|i| {
+    starts.extend((0..settings.sums).map(|i| {
         let sum = Sum::new(i);
         waved(&program, &up, 0.0, &|u| sum.at(u))
     }));
     starts
 }
 
-/// Waves of bend: half waves along the belt, and amplitude in 1/U.
-const BENDS: [(f64, f64); 9] = [
-    (0.0, 0.0),
-    (0.0, 4.0),
-    (0.0, -4.0),
-    (1.0, 4.0),
-    (1.0, -4.0),
-    (2.0, 8.0),
-    (2.0, -8.0),
-    (3.0, 12.0),
-    (3.0, -12.0),
-];
-/// Waves of rib slope: half waves along the belt, and amplitude.
-const SLOPES: [(f64, f64); 5] = [(1.0, 0.0), (1.0, 0.5), (1.0, -0.5), (2.0, 0.5), (2.0, -0.5)];
-/// Number of sums of waves.
-const SUMS: usize = 4000;
-/// Number of waves in each.
+impl Wave {
+    /// The wave with its crest at the start.
+    fn even_at(&self, u: f64) -> f64 {
+        self.amplitude * (PI * self.half_waves * u).cos()
+    }
+
+    /// The wave that is zero at the start.
+    fn odd_at(&self, u: f64) -> f64 {
+        self.amplitude * (PI * self.half_waves * u).sin()
+    }
+}
+
+/// Waves of bend in a sum, and of rib slope; a number.
 const WAVES: usize = 5;
 
 /// Sums of waves of bend and rib slope.
