@@ -9,9 +9,7 @@
 mod starts;
 
 use crate::analysis::symmetry::{SAME, are_twins};
-use crate::equilibrium::{
-    Equilibrium, Status, is_settled, minimum_from, minimum_next_to, of_solution,
-};
+use crate::equilibrium::{Equilibrium, Status, minimum_from, minimum_next_to, of_solution};
 use crate::problem::Problem;
 use crate::problem::program::{BeltPoint, BeltProgram};
 use crate::scenario::Method;
@@ -480,7 +478,7 @@ fn beyond_modal_load(
         return Vec::new();
     };
     let mut found = downhill(problem, settings, program, &other, watch);
-    if is_settled(problem, program, &other.point) {
+    if problem.active_set_fault(program, &other.point).is_none() {
         let solution = stagewise::assess(program, tolerance, &other);
         found.push(of_solution(problem, program.clone(), solution));
     }

@@ -2,7 +2,7 @@
 
 use crate::analysis::path::Path;
 use crate::analysis::symmetry::{SAME, are_twins};
-use crate::equilibrium::{Equilibrium, Stability, Status, Uncertified, is_settled, of_solution};
+use crate::equilibrium::{Equilibrium, Stability, Status, Uncertified, of_solution};
 use crate::geometry::Wrench;
 use crate::names::named;
 use crate::problem::program::{BeltPoint, BeltProgram};
@@ -348,8 +348,10 @@ impl Search<'_, '_> {
         let Diagram { path, mesh, .. } = &self.diagram;
         let is_unsettled = |station: &Station| {
             let meshed = meshed(path, mesh, station.parameter);
-            meshed
-                .is_none_or(|(problem, program)| !is_settled(&problem, &program, &station.at.point))
+            meshed.is_none_or(|(problem, program)| {
+                let fault = problem.active_set_fault(&program, &station.at.point);
+                fault.is_some()
+            })
         };
         if let Some(first) = curve.stations.iter().position(is_unsettled) {
             curve.stations.truncate(first);

@@ -2,7 +2,7 @@
 
 use crate::analysis::continuation::{NoBranch, is_near_limit, meshed};
 use crate::analysis::path::{Motion, NoPath, Path};
-use crate::equilibrium::{Equilibrium, Uncertified, is_settled};
+use crate::equilibrium::{Equilibrium, Uncertified};
 use crate::geometry::{Pose, exp, log};
 use crate::names::named;
 use crate::problem::Mesh;
@@ -394,7 +394,10 @@ impl Way {
     /// Whether the ribs are held by the edges that they reach, and by no other.
     fn holds(&self, station: &Station) -> bool {
         let meshed = meshed(&self.path, &self.mesh, station.parameter);
-        meshed.is_some_and(|(problem, program)| is_settled(&problem, &program, &station.at.point))
+        meshed.is_some_and(|(problem, program)| {
+            let fault = problem.active_set_fault(&program, &station.at.point);
+            fault.is_none()
+        })
     }
 }
 

@@ -1,9 +1,9 @@
 //! Follows an equilibrium at the rate of a robot while one of its supports moves.
 
-use crate::equilibrium::{Equilibrium, Status, Uncertified, is_settled, of_solution, solve_near};
+use crate::equilibrium::{Equilibrium, Status, Uncertified, of_solution, solve_near};
 use crate::geometry::{Pose, Wrench, exp};
 use crate::names::named;
-use crate::problem::program::{BeltPoint, BeltProgram, Piece, rows_of};
+use crate::problem::program::{BeltPoint, BeltProgram, rows_of};
 use crate::problem::{Problem, Units};
 use crate::scenario::error::ScenarioError;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
@@ -68,8 +68,6 @@ pub struct Tracker {
     pose: Pose,
     /// What the potential of the programme lacks.
     potential_of_origin: f64,
-    /// Whether ribs of one stretch may reach the edges of another.
-    has_bends: bool,
 }
 
 impl Tracker {
@@ -93,11 +91,6 @@ impl Tracker {
         };
         let follower = Follower::new(solved.program.clone(), settings, &solved.at);
         let follower = follower.ok_or(NoTracker::Marginal)?;
-        let bends = |piece: &Piece| match piece {
-            Piece::Strip(element) => element.geodesic != 0.0,
-            Piece::Joint { angle } => *angle != 0.0,
-            Piece::Rigid { .. } => false,
-        };
         let (units, origin) = (problem.units(), problem.origin());
         let (program, point) = (&solved.program, &solved.at.point);
         let stored = program.elastic_energy(&point.fields) + program.load_potential(&point.poses);
@@ -107,7 +100,6 @@ impl Tracker {
                 frame,
                 position: (position - origin) / units.length,
             },
-            has_bends: solved.program.pieces.iter().any(bends),
             potential_of_origin: equilibrium.energy - stored * units.energy,
             problem,
             follower,
@@ -206,12 +198,8 @@ impl Tracker {
     }
 
     fn is_settled(&self) -> bool {
-        !self.has_bends
-            || is_settled(
-                &self.problem,
-                self.follower.program(),
-                self.follower.point(),
-            )
+        let (program, point) = (self.follower.program(), self.follower.point());
+        self.problem.active_set_fault(program, point).is_none()
     }
 
     fn return_to_start(&mut self) {

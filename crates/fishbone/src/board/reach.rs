@@ -3,7 +3,7 @@
 use crate::board::feet::{Board, Foot};
 use crate::board::flat::direction;
 use crate::board::outline;
-use crate::strip::ribs::{Edge, FURTHER};
+use crate::strip::bounds::{ActiveEdges, Edge};
 use crate::strip::spine::{Piece, Spine};
 use nalgebra::Vector2;
 use std::f64::consts::PI;
@@ -62,7 +62,7 @@ fn cross(board: &Board, feet: [Foot; 2]) -> bool {
 /// # Panics
 ///
 /// If the spine has no nodes.
-pub(crate) fn further_edges(spine: &Spine) -> Vec<(usize, [Option<Edge>; FURTHER])> {
+pub(crate) fn edges_in_reach(spine: &Spine) -> Vec<(usize, ActiveEdges)> {
     let board = Board::of(spine);
     let edges = |element: usize| {
         let rib = MiddleRib {
@@ -207,7 +207,7 @@ mod tests {
         for angle in [0.4f64, 1.0, 1.5] {
             let spine = ell(angle);
             let mut seen = 0;
-            for (element, [minus, plus, own]) in further_edges(&spine) {
+            for (element, [minus, plus, own]) in edges_in_reach(&spine) {
                 assert_eq!((minus, own), (None, None));
                 let Some(edge) = plus else { continue };
                 let ahead = 0.5 - 0.5 * (spine.u[element] + spine.u[element + 1]);
@@ -274,10 +274,10 @@ mod tests {
                 let rib = MiddleRib { foot, convergence: 1.0 / v, length: 0.0 };
                 let slope = rib.foot.point.rib_slope;
                 let edges = [rib.nearest_edge(&board, side), rib.own_arc(&board, side)];
-                let further = edges.into_iter().flatten().map(|edge| edge.slack(slope, 1.0 / v));
+                let active = edges.into_iter().flatten().map(|edge| edge.slack(slope, 1.0 / v));
                 let geodesic = spine.pieces[element].geodesic();
                 let own = (geodesic == 0.0).then(|| 1.0 - 0.5 * WIDTH / v.abs());
-                let least = further.chain(own).fold(f64::INFINITY, f64::min);
+                let least = active.chain(own).fold(f64::INFINITY, f64::min);
                 prop_assert!(least.abs() < 1e-4, "{element} {u} {v} {slope} {least}");
             }
         }

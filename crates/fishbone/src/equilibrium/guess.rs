@@ -537,7 +537,6 @@ mod tests {
     use crate::problem::program::Hold;
     use crate::strip::developable::{Curl, EnergyModel};
     use crate::strip::element::Element;
-    use crate::strip::ribs::FURTHER;
 
     fn held(node: usize, position: [f64; 3], rotation: Option<[f64; 3]>) -> NodeSupport {
         NodeSupport {
@@ -557,7 +556,6 @@ mod tests {
             rigidity: [1.0; 2],
             half_width: 0.05,
             curl: Curl::default(),
-            further: [None; FURTHER],
         };
         BeltProgram::new(vec![Piece::Strip(element); 40], EnergyModel::Wunderlich)
             .with_supports(supports)
@@ -642,7 +640,6 @@ mod tests {
                 rigidity: [1.0; 2],
                 half_width: 0.05,
                 curl: Curl::default(),
-                further: [None; FURTHER],
             };
             pieces.extend([Piece::Strip(element); 40]);
         }

@@ -1,6 +1,6 @@
 //! The intrinsic method: the interior-point search in the two fields bend and rib slope.
 
-use super::apart::{keep_apart, unsettled};
+use super::active_set::settle;
 use super::search::{CLOSE, COLD, Search, is_flat_under_load};
 use super::stability::Stability;
 use super::{Equilibrium, LinkForce, Reaction, Solved, Start, Status};
@@ -33,26 +33,25 @@ pub(super) fn solve(
             None,
         ),
         None => {
-            let (found, crossing) = find(problem, from, proceed);
+            let (found, fault) = find(problem, from, proceed);
             let redundant = redundant(problem, &found.program);
-            let (status, message) = judge(problem, &found.solution, crossing, redundant.as_deref());
+            let (status, message) = judge(problem, &found.solution, fault, redundant.as_deref());
             (found, status, message, redundant)
         }
     };
     equilibrium(problem, found, status, message, redundant)
 }
 
-/// The equilibrium of a solution of a problem's programme that was found by other means; it has converged only where its
-/// ribs are apart.
+/// The equilibrium of a solution of a problem's programme that was found by other means; it has converged only where the
+/// programme's active sets are right for it.
 pub(crate) fn of_solution(
     problem: &Problem,
     program: BeltProgram,
     solution: Solution<BeltPoint>,
 ) -> Equilibrium {
     let redundant = redundant(problem, &program);
-    let spine = problem.spine(&program, &solution.at.point);
-    let crossing = unsettled(&program, &spine).map(|element| spine.u[element]);
-    let (status, message) = judge(problem, &solution, crossing, redundant.as_deref());
+    let fault = problem.active_set_fault(&program, &solution.at.point);
+    let (status, message) = judge(problem, &solution, fault, redundant.as_deref());
     let found = Found { program, solution };
     equilibrium(problem, found, status, message, redundant)
 }
@@ -135,12 +134,12 @@ fn start(problem: &Problem) -> Found {
     Found { program, solution }
 }
 
-/// Searches; with the arc length where ribs still cross on the board, if they do.
+/// Searches; with the fault of the active sets of the shape found, if there is one.
 fn find(
     problem: &Problem,
     from: Start,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
-) -> (Found, Option<f64>) {
+) -> (Found, Option<String>) {
     let search = Search::of(problem);
     let mut program = problem.program(problem.elements());
     let solution = match from {
@@ -153,13 +152,8 @@ fn find(
             search.run(&program, coarse.as_ref(), proceed)
         }
     };
-    let (solution, crossing) = keep_apart(problem, &search, &mut program, solution, proceed);
-    (Found { program, solution }, crossing)
-}
-
-/// Whether the ribs of a shape are apart on the whole board, and bounded by no edge that they do not reach.
-pub(crate) fn is_settled(problem: &Problem, program: &BeltProgram, point: &BeltPoint) -> bool {
-    unsettled(program, &problem.spine(program, point)).is_none()
+    let (solution, fault) = settle(problem, &search, &mut program, solution, proceed);
+    (Found { program, solution }, fault)
 }
 
 /// The supports and links whose constraints are redundant, by name; `None` where all are independent.
@@ -193,21 +187,14 @@ fn redundant(problem: &Problem, program: &BeltProgram) -> Option<String> {
 fn judge(
     problem: &Problem,
     solution: &Solution<BeltPoint>,
-    crossing: Option<f64>,
+    fault: Option<String>,
     redundant: Option<&str>,
 ) -> (Status, String) {
     let tolerance = problem.tolerance();
     let largest = solution.residuals.largest();
     let (iterations, violation) = (solution.iterations, solution.residuals.constraint);
     match solution.outcome {
-        Outcome::Converged if let Some(u) = crossing => (
-            Status::NotConverged,
-            format!(
-                "ribs beside a bend, at u = {}, could not be kept apart on the board; try another solver.bulge, a \
-                 narrower board or a gentler bend",
-                number(u)
-            ),
-        ),
+        Outcome::Converged if let Some(fault) = fault => (Status::NotConverged, fault),
         Outcome::Converged => (
             Status::Converged,
             format!("converged in {iterations} iterations, largest residual {largest:.1e}"),

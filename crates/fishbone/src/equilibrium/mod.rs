@@ -1,6 +1,6 @@
 //! From a problem to an equilibrium.
 
-mod apart;
+mod active_set;
 pub(crate) mod guess;
 mod intrinsic;
 mod search;
@@ -21,7 +21,7 @@ use stagewise::{Inertia, Multipliers, Residuals, Stationary};
 use std::ops::ControlFlow;
 use thiserror::Error;
 
-pub(crate) use intrinsic::{is_settled, of_solution};
+pub(crate) use intrinsic::of_solution;
 
 named! {
     /// How a solve ended.

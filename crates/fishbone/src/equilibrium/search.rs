@@ -274,12 +274,12 @@ pub(super) fn prolong_inequalities(
         let share = element.length / whole.length;
         let rows = &multipliers[layout.stage_rows(parent)];
         let of_bound = |bound: usize| {
-            let mut known = whole.strips().bounds().zip(rows);
+            let mut known = from.bounds(parent, whole).places().zip(rows);
             known
                 .find(|(known, _)| *known == bound)
                 .map_or(0.0, |(_, multiplier)| share * multiplier)
         };
-        prolonged.extend(element.strips().bounds().map(of_bound));
+        prolonged.extend(to.bounds(k, element).places().map(of_bound));
     }
     prolonged
 }

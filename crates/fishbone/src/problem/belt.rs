@@ -6,7 +6,6 @@ use crate::scenario::error::ScenarioError;
 use crate::scenario::{BeltSpec, Rigidity, SAME_PLACE, SegmentSpec};
 use crate::strip::developable::Curl;
 use crate::strip::element::Element;
-use crate::strip::ribs::FURTHER;
 
 /// A belt in the units of its scenario.
 #[derive(Debug, Clone, PartialEq)]
@@ -332,7 +331,6 @@ impl Belt {
                     bend: strip.curl.bend * length,
                     ..strip.curl
                 },
-                further: [None; FURTHER],
             })
         })
     }

@@ -3,8 +3,10 @@
 //! A [`Problem`] can only be made of a scenario that [`Scenario::validate`] passes, and cannot be changed afterwards: a problem
 //! with other numbers is another problem, validated in its turn.
 
+mod active_set;
 mod assembly;
 pub mod belt;
+mod edges;
 mod mesh;
 pub mod program;
 mod reach;

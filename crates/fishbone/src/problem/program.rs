@@ -22,6 +22,7 @@ pub(crate) use support::Turn;
 pub use support::{Hold, NodeSupport};
 
 use crate::geometry::Pose;
+use crate::strip::bounds::{ACTIVE, ActiveEdges, RibBounds};
 use crate::strip::density::{Density, LANES, Motions};
 use crate::strip::developable::EnergyModel;
 use crate::strip::element::Element;
@@ -46,6 +47,8 @@ pub fn rows_of(multipliers: &[f64], place: usize) -> Rows {
 pub struct BeltProgram<D = EnergyModel, const F: usize = 2, const N: usize = 8> {
     /// Pieces in order along the spine.
     pub pieces: Vec<Piece>,
+    /// Edges of the board that bound the ribs of every piece besides those of its own stretch: none but of strips.
+    pub edges: Vec<ActiveEdges>,
     /// Bending energy.
     pub model: D,
     /// Supports.
@@ -92,6 +95,7 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
     pub fn new(pieces: Vec<Piece>, model: D) -> Self {
         let nodes = pieces.len() + 1;
         Self {
+            edges: vec![[None; ACTIVE]; pieces.len()],
             pieces,
             model,
             supports: Vec::new(),
@@ -220,7 +224,10 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
             return f64::NEG_INFINITY;
         }
         self.elements()
-            .flat_map(|(k, element)| element.strips().slacks(slopes_of(&point.fields, k)))
+            .flat_map(|(k, element)| {
+                let bounds = self.bounds(k, element);
+                bounds.slacks(slopes_of(&point.fields, k))
+            })
             .fold(f64::INFINITY, f64::min)
     }
 
@@ -249,6 +256,14 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
                 Piece::Strip(element) => Some((k, element)),
                 Piece::Rigid { .. } | Piece::Joint { .. } => None,
             })
+    }
+
+    /// The inequalities that keep the ribs of an element apart; it is given with its number among the pieces.
+    pub fn bounds(&self, k: usize, element: &Element) -> RibBounds<'_> {
+        RibBounds {
+            strips: element.strips(),
+            edges: &self.edges[k],
+        }
     }
 
     /// Arc length of every node, in U.

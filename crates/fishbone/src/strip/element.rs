@@ -5,7 +5,7 @@
 
 use crate::geometry::{Pose, Twist, gauss_points, magnus};
 use crate::strip::developable::{Curl, EnergyModel, Term};
-use crate::strip::ribs::{Across, BOUNDS, Edge, FURTHER, SlopeJet, Strips};
+use crate::strip::ribs::{Across, SlopeJet, Strips};
 use nalgebra::{Matrix2, Matrix2x4, Matrix4, Vector3, Vector4};
 
 /// Torsion ω_η = −β ω_ζ.
@@ -44,8 +44,6 @@ pub struct Element {
     pub half_width: f64,
     /// What the element is bent to when nothing acts on it.
     pub curl: Curl,
-    /// Edges of the board, besides those of its own stretch, before which its ribs must not cross either.
-    pub further: [Option<Edge>; FURTHER],
 }
 
 /// A function of the four unknowns with its derivatives.
@@ -149,7 +147,6 @@ impl Element {
             rigidity: [1.0; 2],
             half_width,
             curl,
-            further: [None; FURTHER],
         }
     }
 
@@ -159,22 +156,7 @@ impl Element {
             half_width: self.half_width,
             geodesic: self.geodesic,
             length: self.length,
-            further: self.further,
         }
-    }
-
-    /// How far the ribs are from crossing at the edges, as [`Strips::slacks`]; admissible where positive.
-    ///
-    /// Source: Eq. (33), extended to curved belts
-    pub fn slacks(&self, fields: &Vector4<f64>) -> [f64; BOUNDS] {
-        self.strips().slacks([fields[1], fields[3]])
-    }
-
-    /// The same with derivatives.
-    pub fn slack_jets(&self, fields: &Vector4<f64>) -> [Jet; BOUNDS] {
-        self.strips()
-            .slack_jets([fields[1], fields[3]])
-            .map(Jet::from)
     }
 
     /// Pose increment by a fourth-order Magnus step.
@@ -377,7 +359,6 @@ mod tests {
                         bend: 2.0 * geodesic,
                         poisson: 0.34,
                     },
-                    further: [None; FURTHER],
                 };
                 cases.push((
                     element,

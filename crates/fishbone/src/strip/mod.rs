@@ -1,6 +1,7 @@
 //! The strip between neighbouring ribs: its energy, its motion, and the spine that strips make up.
 
 pub mod automatic;
+pub mod bounds;
 pub mod density;
 pub mod developable;
 pub mod element;

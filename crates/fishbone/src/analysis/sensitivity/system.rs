@@ -221,7 +221,14 @@ fn by_data(
         let [a, b] = [point.fields[k], point.fields[k + 1]];
         let fields = Vector4::new(a[0], a[1], b[0], b[1]);
         let multipliers = &multipliers[rows[k].clone()];
-        by_data[k] = Some(ByData::at(element, program.model, &fields, multipliers));
+        let bounds = program.bounds(k, element);
+        by_data[k] = Some(ByData::at(
+            element,
+            &bounds,
+            program.model,
+            &fields,
+            multipliers,
+        ));
     }
     by_data
 }

@@ -15,12 +15,12 @@ impl<D: Density<F>, const F: usize, const N: usize> Program<6, F, N> for BeltPro
             Piece::Strip(element) => element.length,
             Piece::Rigid { .. } | Piece::Joint { .. } => 0.0,
         };
-        let bounds = |piece: &Piece| match piece {
-            Piece::Strip(element) => element.strips().bounds().count(),
+        let bounds = |(k, piece): (usize, &Piece)| match piece {
+            Piece::Strip(element) => self.bounds(k, element).places().count(),
             Piece::Rigid { .. } | Piece::Joint { .. } => 0,
         };
         let layout = Layout::new(self.pieces.iter().map(weight).collect())
-            .with_stage_inequalities(self.pieces.iter().map(bounds));
+            .with_stage_inequalities(self.pieces.iter().enumerate().map(bounds));
         let supports = self.supports.iter();
         let layout = supports.fold(layout, |layout, support| {
             layout.with_equalities_at(support.node, ROWS)
@@ -38,11 +38,10 @@ impl<D: Density<F>, const F: usize, const N: usize> Program<6, F, N> for BeltPro
     fn evaluate(&self, point: &mut BeltPoint<F>, values: &mut Values) -> bool {
         values.slacks.clear();
         for (k, element) in self.elements() {
-            let strips = element.strips();
-            let slacks = strips.slacks(slopes_of(&point.fields, k));
-            let [plus, minus, further @ ..] = slacks;
+            let bounds = self.bounds(k, element);
+            let [plus, minus, active @ ..] = bounds.slacks(slopes_of(&point.fields, k));
             values.slacks.extend([plus, minus]);
-            for (slack, edge) in further.into_iter().zip(&strips.further) {
+            for (slack, edge) in active.into_iter().zip(bounds.edges) {
                 if edge.is_some() {
                     values.slacks.push(slack);
                 }
@@ -199,20 +198,20 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         k: usize,
         element: &Element,
         point: &BeltPoint<F>,
-        bounds: &[f64],
+        multipliers: &[f64],
         controls: &mut StageMatrix<F>,
         into: &mut Linearisation<6, F, N>,
     ) {
-        let strips = element.strips();
-        let slacks = strips.slack_jets(slopes_of(&point.fields, k));
-        let is_linear = strips.has_linear_bounds();
+        let bounds = self.bounds(k, element);
+        let slacks = bounds.slack_jets(slopes_of(&point.fields, k));
+        let are_linear = bounds.are_linear();
         let rows = into.layout().stage_rows(k);
-        for (row, bound) in rows.zip(strips.bounds()) {
-            let slack = &slacks[bound];
-            if !is_linear {
-                controls.first[(1, 1)] -= bounds[row] * slack.hessian[(0, 0)];
-                controls.mixed[(1, 1)] -= bounds[row] * slack.hessian[(0, 1)];
-                controls.second[(1, 1)] -= bounds[row] * slack.hessian[(1, 1)];
+        for (row, place) in rows.zip(bounds.places()) {
+            let slack = &slacks[place];
+            if !are_linear {
+                controls.first[(1, 1)] -= multipliers[row] * slack.hessian[(0, 0)];
+                controls.mixed[(1, 1)] -= multipliers[row] * slack.hessian[(0, 1)];
+                controls.second[(1, 1)] -= multipliers[row] * slack.hessian[(1, 1)];
             }
             let gradient = &mut into.stage_slacks[row];
             gradient[0].fill(0.0);

@@ -6,10 +6,6 @@ use crate::strip::spine::turn;
 use nalgebra::Vector3;
 
 /// What joins a node to the next.
-#[expect(
-    clippy::large_enum_variant,
-    reason = "nearly all pieces are strips, read one after the other"
-)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Piece {
     /// A flexible element.

@@ -1,6 +1,6 @@
 use super::*;
+use crate::strip::bounds::Edge;
 use crate::strip::developable::Curl;
-use crate::strip::ribs::Edge;
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, SymmetricEigen, Vector2};
 use stagewise::{Linearisation, Multipliers, Program, Stationary, Values, lowest_modes};
 use std::sync::Arc;
@@ -17,17 +17,19 @@ fn element(length: f64, geodesic: f64) -> Piece {
             bend: 0.8,
             poisson: 0.3,
         },
-        further: [
-            None,
-            Some(Edge::line(Vector2::new(0.8, 0.6), 0.03)),
-            Some(Edge {
-                direction: Vector2::x(),
-                distance: 0.05,
-                curvature: 4.0,
-                turn: [-0.5, 0.4],
-            }),
-        ],
     })
+}
+
+/// A line and an arc.
+fn edges() -> ActiveEdges {
+    let arc = Edge {
+        direction: Vector2::x(),
+        distance: 0.05,
+        curvature: 4.0,
+        turn: [-0.5, 0.4],
+    };
+    let line = Edge::line(Vector2::new(0.8, 0.6), 0.03);
+    [None, Some(line), Some(arc)]
 }
 
 /// A ball that nodes must not enter.
@@ -92,6 +94,10 @@ fn program() -> BeltProgram {
         },
     ];
     let mut program = BeltProgram::new(pieces, EnergyModel::Wunderlich).with_supports(supports);
+    let strips: Vec<usize> = program.elements().map(|(k, _)| k).collect();
+    for k in strips {
+        program.edges[k] = edges();
+    }
     program.links = vec![
         NodeLink {
             nodes: [1, 8],

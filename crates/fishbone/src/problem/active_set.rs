@@ -1,0 +1,54 @@
+//! Inequalities of which a programme holds only those that its shape comes near.
+//!
+//! Which part of the board's outline stops a rib depends on the shape, as does which of two parts touches which. So a search
+//! begins without these inequalities, and goes on with those that the shape found breaks or comes near, until the set is right
+//! for the shape found with it.
+
+use super::Problem;
+use super::edges::BoardEdges;
+use crate::problem::program::{BeltPoint, BeltProgram};
+use crate::strip::spine::Spine;
+
+/// Inequalities of one kind, of which a programme holds an active set.
+pub(crate) trait ActiveSet {
+    /// Whether the set may be another for another shape: if not, the programme holds all that there are.
+    fn depends_on_shape(&self, program: &BeltProgram) -> bool;
+
+    /// The fault of the programme's set for a shape, in words: an inequality that it lacks is broken, or one that it holds bounds
+    /// the shape without being near. `None` where the set is right.
+    fn fault(&self, program: &BeltProgram, shape: &Spine) -> Option<String>;
+
+    /// Gives the programme the set for a shape.
+    fn choose(&self, program: &mut BeltProgram, shape: &Spine);
+}
+
+/// All kinds of inequalities with an active set.
+const KINDS: [&dyn ActiveSet; 1] = [&BoardEdges];
+
+impl Problem {
+    /// Whether the active sets of a programme may be others for another shape.
+    pub(crate) fn has_active_sets(&self, program: &BeltProgram) -> bool {
+        KINDS.iter().any(|kind| kind.depends_on_shape(program))
+    }
+
+    /// The first fault of the active sets of a programme for a shape; `None` where they are right.
+    pub(crate) fn active_set_fault(
+        &self,
+        program: &BeltProgram,
+        point: &BeltPoint,
+    ) -> Option<String> {
+        if !self.has_active_sets(program) {
+            return None;
+        }
+        let shape = self.spine(program, point);
+        KINDS.iter().find_map(|kind| kind.fault(program, &shape))
+    }
+
+    /// Gives a programme the active sets for a shape.
+    pub(crate) fn choose_active_sets(&self, program: &mut BeltProgram, point: &BeltPoint) {
+        let shape = self.spine(program, point);
+        for kind in KINDS {
+            kind.choose(program, &shape);
+        }
+    }
+}
