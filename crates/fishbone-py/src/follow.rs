@@ -69,6 +69,7 @@ pub(crate) fn follow(
         step,
         states,
         branches,
+        ..Settings::default()
     };
     let mut signals = Signals::new();
     let found = py.detach(|| {

@@ -29,7 +29,7 @@ pub use linear::{
 };
 pub use path::{
     Continuation, Curve, End, Event, Events, Family, FollowSettings, Followed, Follower, Pace,
-    Station, Turn, over_modal_load, settle,
+    Station, Turn, by_differences, over_modal_load, settle,
 };
 pub use program::{Distance, Linearisation, Multipliers, Program, Scales, Stationary, Values};
 

@@ -8,7 +8,7 @@
 
 mod starts;
 
-use crate::analysis::symmetry::{SAME, are_twins};
+use crate::analysis::symmetry::{SAME, are_images};
 use crate::equilibrium::{Equilibrium, Status, minimum_from, minimum_next_to, of_solution};
 use crate::problem::Problem;
 use crate::problem::program::{BeltPoint, BeltProgram};
@@ -139,7 +139,7 @@ impl SearchSettings {
         is_level
             && index(a) == index(b)
             && solved()
-                .is_some_and(|(a, b)| are_twins(&a.at.point.poses, &b.at.point.poses, distance))
+                .is_some_and(|(a, b)| are_images(&a.at.point.poses, &b.at.point.poses, distance))
     }
 
     /// What differences of energy are measured by: that of bending, as the zero of a load's potential is anywhere; of a flat

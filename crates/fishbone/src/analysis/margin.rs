@@ -1,19 +1,17 @@
 //! How far a support may move before the belt loses its stability.
 
-use crate::analysis::continuation::{NoBranch, is_near_limit, meshed};
+use crate::analysis::continuation::NoBranch;
+use crate::analysis::family::{Along, Station};
 use crate::analysis::path::{Motion, NoPath, Path};
 use crate::equilibrium::{Equilibrium, Uncertified};
 use crate::geometry::{Pose, exp, log};
 use crate::names::named;
 use crate::problem::Mesh;
-use crate::problem::program::{BeltPoint, BeltProgram, rows_of};
+use crate::problem::program::rows_of;
 use nalgebra::{Vector3, Vector6};
-use stagewise::{Continuation, End, Events, Family, Pace, Turn};
+use stagewise::{Continuation, End, Events, Pace, Turn};
 use std::ops::ControlFlow;
 use thiserror::Error;
-
-/// A station of a branch.
-type Station = stagewise::Station<BeltPoint, 8>;
 
 /// A way to the loss of stability.
 #[derive(Debug, Clone, PartialEq)]
@@ -251,7 +249,7 @@ impl Equilibrium {
                 let solved = self.certified()?;
                 let continuation = way.continuation();
                 let modes = continuation
-                    .start(&solved.at, way.path.length(), true)
+                    .start(&solved.at, way.length(), true)
                     .and_then(|station| continuation.modes(&station, LOWEST));
                 let Some(modes) = modes.filter(|modes| modes.len() == LOWEST) else {
                     return Ok(Vec::new());
@@ -286,8 +284,8 @@ impl Equilibrium {
         let start = continuation.start(&solved.at, 0.0, true);
         let start = start.ok_or(NoBranch::Singular)?;
         let curve = continuation.trace(start, &mut |_| proceed());
-        let length = way.path.length();
-        let is_open = |station: &Station| station.negative == 0 && way.holds(station);
+        let length = way.length();
+        let is_open = |station: &Station| station.negative == 0 && way.family.holds(station);
         let stable = curve
             .stations
             .iter()
@@ -297,7 +295,7 @@ impl Equilibrium {
             .last()
             .map_or(0.0, |station| station.parameter);
         let event = curve.events.first().filter(|(state, _)| *state <= stable);
-        let is_near_limit = is_near_limit(&way.path, last);
+        let is_near_limit = way.family.is_near_limit(last);
         let Some((_, event)) =
             event.filter(|(_, event)| event.turn != Turn::Apex || !is_near_limit)
         else {
@@ -332,12 +330,11 @@ impl Equilibrium {
 
 /// A support's way along a direction of norm 1.
 struct Way {
-    path: Path,
-    mesh: Mesh,
+    family: Along,
     from: Pose,
     direction: Vector6<f64>,
     /// U.
-    length: f64,
+    unit: f64,
     pace: Pace,
 }
 
@@ -357,22 +354,24 @@ impl Way {
         let problem = &equilibrium.problem;
         let from = problem.clamp(support);
         let from = from.ok_or(NoMargin::NotClamped(support))?;
-        let length = problem.units().length;
+        let unit = problem.units().length;
         let legs = (reach * direction.fixed_rows::<3>(3).norm() / settings.leg)
             .ceil()
             .max(1.0);
         let ends = (1..=legs as usize).map(|leg| {
-            let end = displaced(&from, direction, length, reach * leg as f64 / legs);
+            let end = displaced(&from, direction, unit, reach * leg as f64 / legs);
             (end.position, log(&end.frame))
         });
         let poses: Vec<_> = ends.collect();
         let path = Path::poses(problem, support, &poses, Motion::Straight);
         Ok(Self {
-            path: path?,
-            mesh: Mesh::of(problem, &solved.program),
+            family: Along {
+                path: path?,
+                mesh: Mesh::of(problem, &solved.program),
+            },
             from,
             direction: *direction,
-            length,
+            unit,
             pace: Pace {
                 longest: settings.step,
                 stations: settings.states,
@@ -383,21 +382,17 @@ impl Way {
 
     /// The support's pose so far along.
     fn pose_at(&self, far: f64) -> Pose {
-        displaced(&self.from, &self.direction, self.length, far)
+        displaced(&self.from, &self.direction, self.unit, far)
     }
 
-    fn continuation(&self) -> Continuation<'_, Self, 6, 2, 8> {
-        let tolerance = self.path.base().tolerance();
-        Continuation::new(self, tolerance, [0.0, self.path.length()], self.pace)
+    /// How far the path goes.
+    fn length(&self) -> f64 {
+        self.family.path.length()
     }
 
-    /// Whether the ribs are held by the edges that they reach, and by no other.
-    fn holds(&self, station: &Station) -> bool {
-        let meshed = meshed(&self.path, &self.mesh, station.parameter);
-        meshed.is_some_and(|(problem, program)| {
-            let fault = problem.active_set_fault(&program, &station.at.point);
-            fault.is_none()
-        })
+    fn continuation(&self) -> Continuation<'_, Along, 6, 2, 8> {
+        let tolerance = self.family.path.base().tolerance();
+        Continuation::new(&self.family, tolerance, [0.0, self.length()], self.pace)
     }
 }
 
@@ -407,14 +402,5 @@ fn displaced(from: &Pose, direction: &Vector6<f64>, unit: f64, far: f64) -> Pose
     Pose {
         position: from.position + unit * shift,
         frame: exp(&turn) * from.frame,
-    }
-}
-
-impl Family<6, 2, 8> for Way {
-    type Point = BeltPoint;
-    type Program = BeltProgram;
-
-    fn at(&self, place: f64) -> Option<BeltProgram> {
-        self.path.at(place)?.program_on(&self.mesh)
     }
 }

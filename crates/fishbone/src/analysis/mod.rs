@@ -2,6 +2,7 @@
 
 pub mod branches;
 pub mod continuation;
+mod family;
 pub mod margin;
 pub mod modes;
 pub mod path;

@@ -1,5 +1,6 @@
 //! Ways through the space of problems: one number or several that change together, or a support that moves.
 
+use crate::analysis::sensitivity::Motion as SupportMotion;
 use crate::geometry::{Pose, Twist, exp, log};
 use crate::names::named;
 use crate::problem::Problem;
@@ -17,6 +18,12 @@ pub trait Change: Debug + Send + Sync {
     ///
     /// Where there is no such problem.
     fn problem(&self, base: &Problem, place: f64) -> Result<Problem, NoPath>;
+
+    /// The support that moves at a place on the path, if nothing else changes there, and how, per unit of place: displacement in
+    /// the unit of the scenario, rotation left in world axes.
+    fn support_motion(&self, _place: f64) -> Option<(usize, SupportMotion)> {
+        None
+    }
 
     /// How far the path goes from 0.
     fn length(&self) -> f64 {
@@ -169,19 +176,39 @@ impl Path {
         self.change.parameter(place)
     }
 
+    /// The support that moves at a place, if nothing else changes there, and how, per unit of place and in the units of the
+    /// programme.
+    pub(super) fn support_motion(&self, place: f64) -> Option<(usize, SupportMotion)> {
+        let (support, mut motion) = self.change.support_motion(place)?;
+        motion.translation /= self.base.units().length;
+        Some((support, motion))
+    }
+
     /// The problem at a place on the path, or a little before or beyond it; `None` where the scenario there is not valid.
     pub fn at(&self, place: f64) -> Option<Problem> {
         self.change.problem(&self.base, place).ok()
     }
 }
 
+impl Poses {
+    /// The poses between which a place lies, and its share of the way from one to the other.
+    fn leg(&self, place: f64) -> (&Pose, &Pose, f64) {
+        let leg = (place.max(0.0) as usize).min(self.poses.len() - 2);
+        (&self.poses[leg], &self.poses[leg + 1], place - leg as f64)
+    }
+}
+
 impl Change for Poses {
     fn problem(&self, base: &Problem, place: f64) -> Result<Problem, NoPath> {
-        let leg = (place.max(0.0) as usize).min(self.poses.len() - 2);
-        let [from, to] = [&self.poses[leg], &self.poses[leg + 1]];
-        let pose = self.motion.between(from, to, place - leg as f64);
+        let (from, to, share) = self.leg(place);
+        let pose = self.motion.between(from, to, share);
         let moved = base.with_support_pose(self.support, &pose);
         moved.map_err(NoPath::Invalid)
+    }
+
+    fn support_motion(&self, place: f64) -> Option<(usize, SupportMotion)> {
+        let (from, to, share) = self.leg(place);
+        Some((self.support, self.motion.rate(from, to, share)))
     }
 
     fn length(&self) -> f64 {
@@ -201,6 +228,24 @@ impl Motion {
             Self::Screw => {
                 let screw = (from.inverse() * *to).log().to_vector();
                 *from * Pose::exp(&Twist::from_vector(&(share * screw)))
+            }
+        }
+    }
+
+    /// How the pose changes there, by the share.
+    fn rate(self, from: &Pose, to: &Pose, share: f64) -> SupportMotion {
+        match self {
+            Self::Straight => SupportMotion {
+                translation: to.position - from.position,
+                rotation: from.frame * log(&(from.frame.transpose() * to.frame)),
+            },
+            Self::Screw => {
+                let screw = (from.inverse() * *to).log();
+                let frame = self.between(from, to, share).frame;
+                SupportMotion {
+                    translation: frame * screw.translation,
+                    rotation: frame * screw.rotation,
+                }
             }
         }
     }

@@ -12,6 +12,7 @@ mod system;
 use crate::equilibrium::{Equilibrium, Uncertified};
 use crate::geometry::Wrench;
 use crate::names::named;
+pub(super) use motion::add_support_motion;
 use nalgebra::{Matrix3x6, Vector3};
 use scales::Scales;
 use stagewise::{Response, Singular};

@@ -243,11 +243,7 @@ impl<const X: usize, const U: usize, const N: usize> Response<X, U, N> {
 
     /// A vector of zeros.
     pub fn zero(&self) -> Direction<N> {
-        Direction {
-            nodes: vec![NodeVector::zeros(); self.layout().nodes()],
-            equalities: vec![0.0; self.layout().equalities()],
-            inequalities: vec![0.0; self.layout().inequalities()],
-        }
+        Direction::zeros(self.layout())
     }
 
     /// Solves the system.
@@ -342,6 +338,15 @@ impl<const X: usize, const U: usize, const N: usize> Response<X, U, N> {
 }
 
 impl<const N: usize> Direction<N> {
+    /// A vector of zeros.
+    pub fn zeros(layout: &Layout) -> Self {
+        Self {
+            nodes: vec![NodeVector::zeros(); layout.nodes()],
+            equalities: vec![0.0; layout.equalities()],
+            inequalities: vec![0.0; layout.inequalities()],
+        }
+    }
+
     /// Adds a multiple of another.
     pub fn add(&mut self, factor: f64, other: &Self) {
         for (own, other) in self.nodes.iter_mut().zip(&other.nodes) {

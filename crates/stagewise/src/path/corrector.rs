@@ -10,7 +10,8 @@ use crate::linear::{Direction, Response};
 use crate::program::{Program, Stationary};
 
 /// Where Newton's method has converged, factorised there.
-pub(super) struct Arrival<const X: usize, const U: usize, const N: usize> {
+pub(super) struct Arrival<P, const X: usize, const U: usize, const N: usize> {
+    program: P,
     response: Response<X, U, N>,
     parameter: f64,
     residuals: Residuals,
@@ -38,7 +39,7 @@ impl<F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
         at: &mut Stationary<F::Point>,
         mut parameter: f64,
         along: Option<(&Tangent<N>, f64)>,
-    ) -> Option<Arrival<X, U, N>> {
+    ) -> Option<Arrival<F::Program, X, U, N>> {
         const MOST: usize = 20;
         /// Length below which a step aside is rounding, in the unit of distance.
         const ROUNDING: f64 = 1e-6;
@@ -57,6 +58,7 @@ impl<F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
                 && response.is_centred(multipliers, barrier);
             if is_met && left == 0.0 {
                 return Some(Arrival {
+                    program,
                     response,
                     parameter,
                     residuals,
@@ -66,7 +68,9 @@ impl<F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
             let mut moved = 0.0;
             let mut drift = None;
             if let Some((along, length)) = along {
-                let by_parameter = self.family.conditions_by_parameter(at, parameter)?;
+                let by_parameter = self
+                    .family
+                    .conditions_by_parameter(&program, at, parameter)?;
                 let answer = response.solve_nearly(&by_parameter).ok()?;
                 moved = (left - dot(&along.force, &step.nodes))
                     / (along.parameter + dot(&along.force, &answer.nodes));
@@ -104,11 +108,13 @@ impl<F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
     pub(super) fn station(
         &self,
         at: Stationary<F::Point>,
-        mut arrival: Arrival<X, U, N>,
+        mut arrival: Arrival<F::Program, X, U, N>,
         before: Option<&Tangent<N>>,
     ) -> Option<Station<F::Point, N>> {
         let parameter = arrival.parameter;
-        let by_parameter = self.family.conditions_by_parameter(&at, parameter)?;
+        let by_parameter = self
+            .family
+            .conditions_by_parameter(&arrival.program, &at, parameter)?;
         let negative = arrival.response.negative();
         let motion = arrival.response.solve_nearly(&by_parameter).ok()?;
         let mut tangent = Tangent {

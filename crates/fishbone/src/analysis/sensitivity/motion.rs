@@ -3,8 +3,9 @@
 
 use super::Motion;
 use crate::geometry::Pose;
-use crate::problem::program::DevelopableNode as NodeVector;
+use crate::problem::program::{DevelopableNode as NodeVector, NodeSupport, ROWS, Turn};
 use nalgebra::Vector3;
+use stagewise::Direction;
 
 /// The motion of a node along the step of its state, a twist about the programme's origin.
 pub(super) fn motion(pose: &Pose, step: &NodeVector) -> Motion {
@@ -27,6 +28,32 @@ pub(super) fn add_pull(
     by_displacement += force;
     let mut by_rotation = into.fixed_rows_mut::<3>(3);
     by_rotation += moment + pose.position.cross(force);
+}
+
+/// Adds the derivative of the first-order conditions by the motion of a support, given with its node's pose and its place.
+///
+/// A support's conditions depend on the turn from its frame to the node's alone. Let these turn by q and e: the
+/// turn changes by e − q − ½ q × e, so that the mixed second derivative of multipliers times conditions is that by
+/// e, with the sign changed, and −½ m · (q × e) with their moment m.
+pub(in crate::analysis) fn add_support_motion(
+    support: &NodeSupport,
+    turn: &Turn,
+    pose: &Pose,
+    place: usize,
+    motion: &Motion,
+    into: &mut Direction<8>,
+) {
+    let rotation = &motion.rotation;
+    let position = support.held(&motion.translation);
+    let frame = turn.jacobian * rotation;
+    let missed = position.iter().chain(&frame);
+    let rows = &mut into.equalities[ROWS * place..ROWS * (place + 1)];
+    for (row, missed) in rows.iter_mut().zip(missed) {
+        *row -= missed;
+    }
+    let moment = -turn.hessian * rotation - 0.5 * turn.pull.cross(rotation);
+    let node = &mut into.nodes[support.node];
+    add_pull(pose, &Vector3::zeros(), &moment, node);
 }
 
 #[cfg(test)]

@@ -2,11 +2,11 @@
 
 use super::Motion;
 use super::data::{ByData, Data, HALF_WIDTH};
-use super::motion::{add_pull, motion};
+use super::motion::{add_pull, add_support_motion, motion};
 use crate::equilibrium::Solved;
 use crate::problem::program::{
-    BeltPoint, BeltProgram, DevelopableNode as NodeVector, NodeSupport, Piece, ROWS, Rows, Turn,
-    rows_of, weight,
+    BeltPoint, BeltProgram, DevelopableNode as NodeVector, NodeSupport, Piece, Rows, Turn, rows_of,
+    weight,
 };
 use nalgebra::{Vector3, Vector4};
 use stagewise::{Direction as Step, Program};
@@ -80,25 +80,10 @@ impl System {
     }
 
     /// Adds what a change puts on the right-hand side.
-    ///
-    /// A support's conditions depend on the turn from its frame to the node's alone. Let these turn by q and e: the
-    /// turn changes by e − q − ½ q × e, so that the mixed second derivative of multipliers times conditions is that by
-    /// e, with the sign changed, and −½ m · (q × e) with their moment m.
     pub(super) fn add_change(&self, change: &Direction, into: &mut Step<8>) {
         for (i, support, turn) in self.supports() {
-            let Motion {
-                translation,
-                rotation,
-            } = &change.supports[i];
-            let position = support.held(translation);
-            let frame = turn.jacobian * rotation;
-            let missed = position.iter().chain(&frame);
-            let rows = &mut into.equalities[ROWS * i..ROWS * (i + 1)];
-            for (row, missed) in rows.iter_mut().zip(missed) {
-                *row -= missed;
-            }
-            let moment = -turn.hessian * rotation - 0.5 * turn.pull.cross(rotation);
-            self.add_pull(support.node, &Vector3::zeros(), &moment, &mut into.nodes);
+            let pose = &self.point.poses[support.node];
+            add_support_motion(support, turn, pose, i, &change.supports[i], into);
         }
         for (k, element) in self.elements() {
             let data = &change.elements[k];
