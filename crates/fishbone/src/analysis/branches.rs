@@ -156,7 +156,7 @@ impl SearchSettings {
 }
 
 /// Runs `task(i)` for every i below a number, in any order and on any thread.
-pub type Run<'a> = dyn Fn(usize, &(dyn Fn(usize) + Sync)) + 'a;
+pub(crate) type Run<'a> = dyn Fn(usize, &(dyn Fn(usize) + Sync)) + 'a;
 
 /// What is asked and reported while the search goes on, from any thread.
 pub trait Watch: Sync {

@@ -296,7 +296,7 @@ impl Diagram {
     /// # Panics
     ///
     /// If there is no such state.
-    pub fn problem(&self, branch: usize, state: usize) -> Problem {
+    pub(crate) fn problem(&self, branch: usize, state: usize) -> Problem {
         let place = self.branches[branch].states[state].place;
         let problem = self.path.at(place);
         let problem = problem.and_then(|p| p.with_elements(self.path.base().elements()).ok());

@@ -162,7 +162,7 @@ impl Path {
     }
 
     /// The problem where the path begins.
-    pub fn base(&self) -> &Problem {
+    pub(crate) fn base(&self) -> &Problem {
         &self.base
     }
 

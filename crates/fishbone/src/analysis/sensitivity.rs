@@ -160,7 +160,7 @@ impl Sensitivity {
     }
 
     /// No change of any parameter.
-    pub fn no_parameters(&self) -> Parameters {
+    pub(crate) fn no_parameters(&self) -> Parameters {
         Parameters {
             supports: vec![Motion::default(); self.supports()],
             rigidity: vec![0.0; self.nodes],
@@ -170,7 +170,7 @@ impl Sensitivity {
     }
 
     /// No change of the equilibrium.
-    pub fn no_change(&self) -> Change {
+    pub(crate) fn no_change(&self) -> Change {
         let nothing = Vector3::zeros();
         let no_wrench = Wrench {
             force: nothing,

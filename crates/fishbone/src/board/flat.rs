@@ -1,6 +1,5 @@
 //! The flat spine of the developed board: stretches of one in-plane curvature, and corners between them.
 
-use crate::board::curve::Curve;
 use crate::strip::spine::{Piece, Spine};
 use nalgebra::Vector2;
 
@@ -17,24 +16,24 @@ pub struct FlatFrame {
 
 impl FlatFrame {
     /// The start of the belt.
-    pub const START: Self = Self {
+    pub(crate) const START: Self = Self {
         position: Vector2::new(0.0, 0.0),
         heading: 0.0,
     };
 
     /// Unit tangent, η of the flat board.
-    pub fn tangent(&self) -> Vector2<f64> {
+    pub(crate) fn tangent(&self) -> Vector2<f64> {
         direction(self.heading)
     }
 
     /// Unit vector across, ζ of the flat board.
-    pub fn across(&self) -> Vector2<f64> {
+    pub(crate) fn across(&self) -> Vector2<f64> {
         let tangent = self.tangent();
         Vector2::new(-tangent.y, tangent.x)
     }
 
     /// The frame a distance on along an arc of given curvature.
-    pub fn along(&self, curvature: f64, distance: f64) -> Self {
+    pub(crate) fn along(&self, curvature: f64, distance: f64) -> Self {
         let half = 0.5 * curvature * distance;
         let chord = distance * if half == 0.0 { 1.0 } else { half.sin() / half };
         Self {
@@ -44,13 +43,13 @@ impl FlatFrame {
     }
 
     /// Coordinates of a flat point in this frame: along and across.
-    pub fn local(&self, point: &Vector2<f64>) -> Vector2<f64> {
+    pub(crate) fn local(&self, point: &Vector2<f64>) -> Vector2<f64> {
         let offset = point - self.position;
         Vector2::new(self.tangent().dot(&offset), self.across().dot(&offset))
     }
 
     /// The flat point of given coordinates in this frame.
-    pub fn global(&self, local: &Vector2<f64>) -> Vector2<f64> {
+    pub(crate) fn global(&self, local: &Vector2<f64>) -> Vector2<f64> {
         self.position + local.x * self.tangent() + local.y * self.across()
     }
 }
@@ -74,13 +73,6 @@ pub(crate) struct Segment {
 impl Segment {
     pub(crate) fn end(&self) -> FlatFrame {
         self.start.along(self.geodesic, self.length)
-    }
-
-    fn curve(&self) -> Curve {
-        Curve::offset(&self.start, self.geodesic, self.length, 0.0).unwrap_or(Curve::Line {
-            from: self.start.position,
-            to: self.start.position,
-        })
     }
 }
 
@@ -156,16 +148,6 @@ impl FlatSpine {
         self.nodes.push(self.segments[index].end());
         self.owner.push(index);
     }
-}
-
-/// The flat spine in exact pieces, from the start of the belt to its end.
-///
-/// # Panics
-///
-/// If the spine has no nodes.
-pub fn flat_spine(spine: &Spine) -> Vec<Curve> {
-    let flat = FlatSpine::of(spine);
-    flat.segments.iter().map(Segment::curve).collect()
 }
 
 /// The flat motion that takes one round of a closed belt to the next, as the belt is unrolled.

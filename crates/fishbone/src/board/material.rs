@@ -2,7 +2,7 @@
 
 /// An isotropic material.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Material {
+pub(crate) struct Material {
     /// Young's modulus E. Units: Pa.
     pub young: f64,
     /// Poisson's ratio ν.
@@ -13,7 +13,7 @@ pub struct Material {
 
 /// One layer of a laminate.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Layer {
+pub(crate) struct Layer {
     /// What it is made of.
     pub material: Material,
     /// Thickness t. Units: m.
@@ -22,7 +22,7 @@ pub struct Layer {
 
 /// How a stack of bonded layers bends; a single sheet is the stack of one.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Laminate {
+pub(crate) struct Laminate {
     /// Height z₀ of the neutral surface above the bottom. Units: m.
     pub neutral: f64,
     /// Flexural rigidity per width, D₁₁. Units: N·m.
@@ -34,7 +34,7 @@ pub struct Laminate {
 }
 
 /// The materials known by name; names are compared without regard to case, spaces, underscores and hyphens.
-pub const PRESETS: [(&str, Material); 7] = [
+pub(crate) const PRESETS: [(&str, Material); 7] = [
     ("polyimide", POLYIMIDE),
     ("rolled-copper", ROLLED_COPPER),
     ("PET", PET),
@@ -47,40 +47,40 @@ pub const PRESETS: [(&str, Material); 7] = [
 /// Polyimide film at 23 °C.
 ///
 /// Source: DuPont, Kapton HN data sheet; Poisson's ratio from the same maker's summary of properties.
-pub const POLYIMIDE: Material = Material::new(2.5e9, 0.34, 1420.0);
+pub(crate) const POLYIMIDE: Material = Material::new(2.5e9, 0.34, 1420.0);
 
 /// Rolled, annealed copper.
 ///
 /// Rolling texture makes foils softer along some directions than this value for the bulk.
 ///
 /// Source: data sheets of electrolytic tough pitch copper, UNS C11000.
-pub const ROLLED_COPPER: Material = Material::new(117e9, 0.34, 8940.0);
+pub(crate) const ROLLED_COPPER: Material = Material::new(117e9, 0.34, 8940.0);
 
 /// Biaxially oriented polyester film, mean of both directions.
 ///
 /// Source: DuPont Teijin Films, Mylar bulletin H-37232, type 92A; Poisson's ratio before yield.
-pub const PET: Material = Material::new(4.9e9, 0.38, 1390.0);
+pub(crate) const PET: Material = Material::new(4.9e9, 0.38, 1390.0);
 
 /// General-purpose polystyrene.
 ///
 /// Source: handbook values, inside the ranges of CRC and Cardarelli, Materials Handbook.
-pub const POLYSTYRENE: Material = Material::new(3.2e9, 0.34, 1050.0);
+pub(crate) const POLYSTYRENE: Material = Material::new(3.2e9, 0.34, 1050.0);
 
 /// Woven glass in epoxy, along the warp; across it, E is about 21 GPa.
 ///
 /// Source: the commonly tabulated values of NEMA grade FR-4; makers differ by some 10 %.
-pub const FR_4: Material = Material::new(24e9, 0.136, 1850.0);
+pub(crate) const FR_4: Material = Material::new(24e9, 0.136, 1850.0);
 
 /// Austenitic stainless steel, AISI 304.
 ///
 /// Source: data sheets of AISI 304, UNS S30400.
-pub const STAINLESS_STEEL: Material = Material::new(193e9, 0.29, 8000.0);
+pub(crate) const STAINLESS_STEEL: Material = Material::new(193e9, 0.29, 8000.0);
 
 /// Acrylic bonding sheet of flexible circuits at 23 °C.
 ///
 /// An estimate for a rubber-toughened acrylic: the makers' data sheets give no elastic constants, and they change with
 /// temperature and rate. Give `young` where it matters.
-pub const ACRYLIC_ADHESIVE: Material = Material::new(0.2e9, 0.42, 1200.0);
+pub(crate) const ACRYLIC_ADHESIVE: Material = Material::new(0.2e9, 0.42, 1200.0);
 
 impl Material {
     const fn new(young: f64, poisson: f64, density: f64) -> Self {
@@ -92,7 +92,7 @@ impl Material {
     }
 
     /// The material of a name in [`PRESETS`].
-    pub fn named(name: &str) -> Option<Self> {
+    pub(crate) fn named(name: &str) -> Option<Self> {
         let (_, material) = PRESETS.iter().find(|(known, _)| key(known) == key(name))?;
         Some(*material)
     }
@@ -118,7 +118,7 @@ impl Laminate {
     /// ∫(z − z₀)² dz. Of one layer, D₁₁ = E t³/(12 (1 − ν²)).
     ///
     /// Source: classical laminate theory, as in Jones, Mechanics of Composite Materials.
-    pub fn of(layers: &[Layer]) -> Self {
+    pub(crate) fn of(layers: &[Layer]) -> Self {
         let middles = middles(layers);
         let stretch = |layer: &Layer| layer.material.plane_strain() * layer.thickness;
         let moment: f64 = layers

@@ -14,7 +14,7 @@ pub struct Stability {
 
 impl Stability {
     /// Whether the equilibrium is a local minimum; `None` where a way of no second variation leaves that open.
-    pub fn is_stable(&self) -> Option<bool> {
+    pub(crate) fn is_stable(&self) -> Option<bool> {
         match (self.negative_modes, self.zero_modes) {
             (0, 0) => Some(true),
             (0, _) => None,

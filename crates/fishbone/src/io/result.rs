@@ -18,7 +18,7 @@ type Point = [f64; 3];
 /// `u` and all that has one entry a node share their first dimension; frames are row-major matrices whose columns are
 /// ξ, η, ζ.
 #[derive(Debug, Clone, Serialize)]
-pub struct Record<'a> {
+pub(crate) struct Record<'a> {
     schema: &'static str,
     status: Status,
     message: &'a str,
@@ -128,7 +128,7 @@ impl Equilibrium {
 
 impl<'a> Record<'a> {
     /// The record of an equilibrium.
-    pub fn new(equilibrium: &'a Equilibrium) -> Self {
+    pub(crate) fn new(equilibrium: &'a Equilibrium) -> Self {
         let spine = &equilibrium.spine;
         let highest = equilibrium.highest_point();
         let margin = surface::rib_margin(spine);

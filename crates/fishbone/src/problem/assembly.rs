@@ -56,7 +56,7 @@ impl Problem {
     }
 
     /// The spine of a shape of one of the problem's programmes, in the units of the scenario.
-    pub fn spine(&self, program: &BeltProgram, point: &BeltPoint) -> Spine {
+    pub(crate) fn spine(&self, program: &BeltProgram, point: &BeltPoint) -> Spine {
         let length = self.units.length;
         let pose = |pose: &Pose| Pose {
             frame: pose.frame,

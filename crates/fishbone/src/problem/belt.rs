@@ -9,7 +9,7 @@ use crate::strip::element::Element;
 
 /// A belt in the units of its scenario.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Belt {
+pub(crate) struct Belt {
     /// Width V.
     pub width: f64,
     /// Segments in order along the spine.
@@ -22,7 +22,7 @@ pub struct Belt {
 
 /// A piece of the belt of one kind.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Segment {
+pub(crate) enum Segment {
     /// A flexible strip.
     Strip(Strip),
     /// A stiffener.
@@ -39,7 +39,7 @@ pub enum Segment {
 
 /// A flexible strip of constant in-plane curvature.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Strip {
+pub(crate) struct Strip {
     /// Length along the spine.
     pub length: f64,
     /// In-plane curvature κ_g of the flat board.
@@ -52,7 +52,7 @@ pub struct Strip {
 
 /// A place that must be a node of the mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Break {
+pub(crate) struct Break {
     /// Arc length.
     pub u: f64,
     /// Whether a moment may act there, so that the bend jumps.
@@ -137,7 +137,7 @@ impl Segment {
     }
 
     /// Length along the spine.
-    pub fn length(&self) -> f64 {
+    pub(crate) fn length(&self) -> f64 {
         match self {
             Self::Strip(strip) => strip.length,
             Self::Rigid { length } => *length,
@@ -181,7 +181,7 @@ impl Belt {
     /// # Errors
     ///
     /// [`ScenarioError`] where a segment that bends has no rigidity.
-    pub fn new(spec: &BeltSpec) -> Result<Self, ScenarioError> {
+    pub(crate) fn new(spec: &BeltSpec) -> Result<Self, ScenarioError> {
         let segments = spec.segments.iter();
         let segments: Option<_> = segments
             .map(|segment| Segment::new(segment, spec))
@@ -199,12 +199,12 @@ impl Belt {
     }
 
     /// Length U of the spine.
-    pub fn length(&self) -> f64 {
+    pub(crate) fn length(&self) -> f64 {
         self.segments.iter().map(Segment::length).sum()
     }
 
     /// Mean rigidity over what bends, the scale of energies.
-    pub fn mean_rigidity(&self) -> f64 {
+    pub(crate) fn mean_rigidity(&self) -> f64 {
         let strips = || self.segments.iter().filter_map(Segment::strip);
         let length: f64 = strips().map(|strip| strip.length).sum();
         strips().map(Strip::total_rigidity).sum::<f64>() / length
@@ -212,7 +212,7 @@ impl Belt {
 
     /// Whether bend and slope go on through the seam of a closed belt, up to the sign that an odd number of half turns
     /// gives them; the slope does but at a stiffener.
-    pub fn goes_on_through_seam(&self) -> [bool; 2] {
+    pub(crate) fn goes_on_through_seam(&self) -> [bool; 2] {
         let (Some(Segment::Strip(last)), Some(Segment::Strip(first))) =
             (self.segments.last(), self.segments.first())
         else {
@@ -231,7 +231,7 @@ impl Belt {
     }
 
     /// The sign that bend, slope and in-plane curvature take on across the seam.
-    pub fn seam_sign(&self) -> f64 {
+    pub(crate) fn seam_sign(&self) -> f64 {
         match self.half_turns.unwrap_or(0) % 2 {
             0 => 1.0,
             _ => -1.0,
@@ -240,13 +240,13 @@ impl Belt {
 
     /// `count` elements shared out by length, a few more where that takes parts of one between two breaks, ends of
     /// segments or entries of a table of rigidity; lengths in U, rigidity in its mean. A stiffened stretch is one piece.
-    pub fn pieces(&self, count: usize, breaks: &[Break]) -> Vec<Piece> {
+    pub(crate) fn pieces(&self, count: usize, breaks: &[Break]) -> Vec<Piece> {
         let shared = self.pieces_shared(&self.shares(count, breaks), breaks);
         shared.expect("a share for every stretch")
     }
 
     /// How many elements every stretch gets of a count.
-    pub fn shares(&self, count: usize, breaks: &[Break]) -> Vec<usize> {
+    pub(crate) fn shares(&self, count: usize, breaks: &[Break]) -> Vec<usize> {
         let of_length = |stretch: &Stretch| (stretch.to - stretch.from) / self.length();
         let stretches = self.stretches(breaks);
         let share = |stretch: &Stretch| share(count, of_length(stretch)).max(stretch.fewest());
@@ -254,7 +254,7 @@ impl Belt {
     }
 
     /// The same with so many elements to every stretch; `None` where there are not as many stretches.
-    pub fn pieces_shared(&self, shares: &[usize], breaks: &[Break]) -> Option<Vec<Piece>> {
+    pub(crate) fn pieces_shared(&self, shares: &[usize], breaks: &[Break]) -> Option<Vec<Piece>> {
         let (length, rigidity) = (self.length(), self.mean_rigidity());
         let stretches = self.stretches(breaks);
         if stretches.len() != shares.len() {

@@ -189,7 +189,7 @@ impl Problem {
     }
 
     /// The belt, in the units of the scenario.
-    pub fn belt(&self) -> &Belt {
+    pub(crate) fn belt(&self) -> &Belt {
         &self.belt
     }
 
@@ -210,18 +210,18 @@ impl Problem {
     }
 
     /// The direction along which the belt should bulge, world axes; of any length.
-    pub fn bulge(&self) -> Vector3<f64> {
+    pub(crate) fn bulge(&self) -> Vector3<f64> {
         Vector3::from(self.scenario.solver.bulge)
     }
 
     /// The largest residual of what counts as converged: lengths in U and energy in mean R_f/U.
-    pub fn tolerance(&self) -> f64 {
+    pub(crate) fn tolerance(&self) -> f64 {
         self.scenario.solver.tolerance
     }
 
     /// The pose at which a support, given by its place in the scenario, holds the belt; `None` where there is no such
     /// support, or it leaves any part of the pose free. Units: those of the scenario.
-    pub fn clamp(&self, support: usize) -> Option<Pose> {
+    pub(crate) fn clamp(&self, support: usize) -> Option<Pose> {
         clamp(&self.scenario, support)
     }
 

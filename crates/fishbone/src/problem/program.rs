@@ -30,15 +30,15 @@ use nalgebra::{Rotation3, SVector, UnitQuaternion, Vector3, Vector6};
 use stagewise::{Distance, NodeVector};
 
 /// Unknowns of a node of a developable belt: a twist of the pose in world axes about the origin, then bend and rib slope.
-pub type DevelopableNode = NodeVector<8>;
+pub(crate) type DevelopableNode = NodeVector<8>;
 
 /// Rows of the conditions of one support or link.
-pub const ROWS: usize = 6;
+pub(crate) const ROWS: usize = 6;
 /// Values or multipliers of the conditions of one support or link; unused rows are zero.
-pub type Rows = SVector<f64, ROWS>;
+pub(crate) type Rows = SVector<f64, ROWS>;
 
 /// The multipliers of a support or link, by its place: supports first, then links.
-pub fn rows_of(multipliers: &[f64], place: usize) -> Rows {
+pub(crate) fn rows_of(multipliers: &[f64], place: usize) -> Rows {
     Rows::from_column_slice(&multipliers[ROWS * place..ROWS * (place + 1)])
 }
 
@@ -124,7 +124,7 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
 
     /// A closed belt cut open at its seam and twisted there by an angle in place of its half turns, as between two
     /// clamps.
-    pub fn cut_and_twisted(&self, angle: f64) -> Self {
+    pub(crate) fn cut_and_twisted(&self, angle: f64) -> Self {
         let mut cut = self.clone();
         for link in &mut cut.links {
             match &mut link.tie {
@@ -219,7 +219,7 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
     }
 
     /// The least of how far the ribs are from crossing; negative infinity where one would leave through a bend.
-    pub fn least_slack(&self, point: &BeltPoint<F>) -> f64 {
+    pub(crate) fn least_slack(&self, point: &BeltPoint<F>) -> f64 {
         if self.rib_leaves_through_bend(point) {
             return f64::NEG_INFINITY;
         }
@@ -232,7 +232,7 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
     }
 
     /// By how much a shape misses its supports, lengths in U and angles in rad.
-    pub fn miss_of_supports(&self, point: &BeltPoint<F>) -> f64 {
+    pub(crate) fn miss_of_supports(&self, point: &BeltPoint<F>) -> f64 {
         let miss = |support: &NodeSupport| support.value(&point.poses[support.node]).norm();
         self.supports.iter().map(miss).sum()
     }
@@ -243,12 +243,12 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
     }
 
     /// The rib slope of a node, where it is prescribed.
-    pub fn fixed_slope(&self, node: usize) -> Option<f64> {
+    pub(crate) fn fixed_slope(&self, node: usize) -> Option<f64> {
         self.fixed[node][1]
     }
 
     /// The elements that bend, each with its number among the pieces.
-    pub fn elements(&self) -> impl Iterator<Item = (usize, &Element)> {
+    pub(crate) fn elements(&self) -> impl Iterator<Item = (usize, &Element)> {
         self.pieces
             .iter()
             .enumerate()
@@ -259,7 +259,7 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
     }
 
     /// The inequalities that keep the ribs of an element apart; it is given with its number among the pieces.
-    pub fn bounds(&self, k: usize, element: &Element) -> RibBounds<'_> {
+    pub(crate) fn bounds(&self, k: usize, element: &Element) -> RibBounds<'_> {
         RibBounds {
             strips: element.strips(),
             edges: &self.edges[k],
@@ -267,7 +267,7 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
     }
 
     /// Arc length of every node, in U.
-    pub fn nodes(&self) -> Vec<f64> {
+    pub(crate) fn nodes(&self) -> Vec<f64> {
         let mut u = 0.0;
         let mut nodes = vec![u];
         for piece in &self.pieces {
@@ -279,7 +279,7 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
     }
 
     /// Bending energy of a shape.
-    pub fn elastic_energy(&self, fields: &[SVector<f64, F>]) -> f64 {
+    pub(crate) fn elastic_energy(&self, fields: &[SVector<f64, F>]) -> f64 {
         let energy = |(k, element): (usize, &Element)| {
             self.model.energy(element, [&fields[k], &fields[k + 1]])
         };
@@ -287,7 +287,7 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
     }
 
     /// Potential of weight and loads.
-    pub fn load_potential(&self, poses: &[Pose]) -> f64 {
+    pub(crate) fn load_potential(&self, poses: &[Pose]) -> f64 {
         let loads = self.loads.iter();
         let dead: f64 = loads
             .map(|load| load.load.potential(&poses[load.node]))
@@ -303,7 +303,7 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
     }
 
     /// Whether weight or dead forces act.
-    pub fn is_loaded(&self) -> bool {
+    pub(crate) fn is_loaded(&self) -> bool {
         !self.is_weightless() || !self.loads.is_empty()
     }
 
@@ -312,7 +312,7 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
     }
 
     /// Carries the poses on from the first, Eq. (3).
-    pub fn carry(&self, point: &mut BeltPoint<F>) {
+    pub(crate) fn carry(&self, point: &mut BeltPoint<F>) {
         let mut motions = D::Motions::default();
         let mut pose = point.poses[0];
         for (pieces, from) in self.pieces.chunks(LANES).zip((0..).step_by(LANES)) {
@@ -373,7 +373,7 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
 
     /// Force and moment at every node, world axes: what the belt beyond does to the part before; at the last node,
     /// what holds and loads it.
-    pub fn internal(
+    pub(crate) fn internal(
         &self,
         point: &BeltPoint<F>,
         multipliers: &[f64],
@@ -400,7 +400,7 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
     }
 
     /// Moves a support that holds a node by position and frame.
-    pub fn move_support(&mut self, support: usize, pose: &Pose) {
+    pub(crate) fn move_support(&mut self, support: usize, pose: &Pose) {
         let [x, y, z] = pose.position.into();
         let frame =
             UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(pose.frame));
@@ -424,7 +424,7 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
     }
 
     /// Force of every link on its second node, world axes; on the first it is the opposite.
-    pub fn link_forces(&self, multipliers: &[f64]) -> Vec<Vector3<f64>> {
+    pub(crate) fn link_forces(&self, multipliers: &[f64]) -> Vec<Vector3<f64>> {
         let links = (0..self.links.len()).map(|i| self.supports.len() + i);
         links
             .map(|place| -rows_of(multipliers, place).fixed_rows::<3>(0).into_owned())

@@ -32,7 +32,7 @@ impl fmt::Display for OutOfReach {
 
 impl Problem {
     /// The first two points that are held too far apart for the belt between them; `None` where there are none.
-    pub fn unreachable_supports(&self) -> Option<OutOfReach> {
+    pub(crate) fn unreachable_supports(&self) -> Option<OutOfReach> {
         let too_long = Span::all(&self.scenario).find(|span| span.excess() > span.rounding)?;
         Some(OutOfReach {
             held: too_long.held,

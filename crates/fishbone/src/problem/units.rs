@@ -23,7 +23,7 @@ impl Units {
     }
 
     /// The unit of force: energy over length.
-    pub fn force(&self) -> f64 {
+    pub(crate) fn force(&self) -> f64 {
         self.energy / self.length
     }
 

@@ -65,7 +65,7 @@ impl Orientation {
     /// on to ±π while ψ makes up for it.
     ///
     /// Source: Eq. (46), (49)
-    pub fn as_in_source(frame: &Matrix3<f64>) -> Self {
+    pub(crate) fn as_in_source(frame: &Matrix3<f64>) -> Self {
         if (frame - Matrix3::identity()).amax() < 1e-12 {
             return Self::Angles([0.0; 3]);
         }
@@ -135,7 +135,7 @@ pub struct Violation {
 
 impl Violation {
     /// The largest of all.
-    pub fn max(&self) -> f64 {
+    pub(crate) fn max(&self) -> f64 {
         [
             self.geometric,
             self.geodesic,
@@ -176,12 +176,12 @@ pub struct Solution {
 
 impl Solution {
     /// Eulerian angles φ, θ, ψ at u.
-    pub fn euler(&self, u: f64) -> [f64; 3] {
+    pub(crate) fn euler(&self, u: f64) -> [f64; 3] {
         local::euler(&self.local(u))
     }
 
     /// Rib slope β at u.
-    pub fn rib_slope(&self, u: f64) -> f64 {
+    pub(crate) fn rib_slope(&self, u: f64) -> f64 {
         self.local(u)[6]
     }
 
@@ -189,21 +189,21 @@ impl Solution {
     ///
     /// Units: rad/U.
     /// Source: Eq. (4)
-    pub fn rates(&self, u: f64) -> Vector3<f64> {
+    pub(crate) fn rates(&self, u: f64) -> Vector3<f64> {
         local::rates(&self.local(u)).into()
     }
 
     /// Frame [ξ η ζ] at u.
     ///
     /// Source: Eq. (1), (2)
-    pub fn frame(&self, u: f64) -> Matrix3<f64> {
+    pub(crate) fn frame(&self, u: f64) -> Matrix3<f64> {
         local::frame(self.euler(u))
     }
 
     /// Positions of the spine at each of `u`.
     ///
     /// Source: Eq. (3)
-    pub fn positions(&self, u: &[f64]) -> Vec<Vector3<f64>> {
+    pub(crate) fn positions(&self, u: &[f64]) -> Vec<Vector3<f64>> {
         let rule = quadrature(self.coefficients.nrows());
         let tangent = |u: f64| self.frame(u).column(1).into_owned();
         let position = |&u: &f64| rule.iter().map(|(s, w)| tangent(u * s) * (u * w)).sum();
@@ -373,7 +373,7 @@ fn solution(problem: &Problem, options: &Options, updates: usize, minimum: Minim
 /// Shapes: (n, 4).
 ///
 /// Panics: on options out of their ranges.
-pub fn start(problem: &Problem, options: &Options) -> DMatrix<f64> {
+pub(crate) fn start(problem: &Problem, options: &Options) -> DMatrix<f64> {
     const LEAN: f64 = 0.1;
     check(options);
     let turn = turn(problem);

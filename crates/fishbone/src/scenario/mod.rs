@@ -16,10 +16,10 @@ use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
 /// Two places along the spine closer than this, relative to the length of the belt, are one place: sums of decimal
 /// lengths are not exact.
-pub const SAME_PLACE: f64 = 1e-9;
+pub(crate) const SAME_PLACE: f64 = 1e-9;
 
 /// Poisson's ratio of a belt that names none.
-pub const DEFAULT_POISSON: f64 = 0.3;
+pub(crate) const DEFAULT_POISSON: f64 = 0.3;
 
 table! {
     /// A belt, its supports and loads, and how to solve for its shape.
@@ -404,27 +404,27 @@ impl Scenario {
     /// Number of elements: the solver's own, or 8 U/V and at least 80.
     ///
     /// Elements longer than V/4 give false energy levels; V/8 is safe.
-    pub fn elements(&self) -> usize {
+    pub(crate) fn elements(&self) -> usize {
         self.solver
             .elements
             .unwrap_or_else(|| self.default_elements())
     }
 
     /// Whether the rib at a support is square: as the support says, else at a clamped end; a closed belt has no ends.
-    pub fn is_square_rib(&self, support: &SupportSpec) -> bool {
+    pub(crate) fn is_square_rib(&self, support: &SupportSpec) -> bool {
         let clamped_end = !self.belt.closed && support.is_square_rib(self.belt.length());
         support.square_rib.unwrap_or(clamped_end)
     }
 
     /// Number of elements where the scenario names none.
-    pub fn default_elements(&self) -> usize {
+    pub(crate) fn default_elements(&self) -> usize {
         default_elements(self.belt.length(), self.belt.width)
     }
 
     /// Arc lengths where elements must meet: both ends, joints of segments, supports, links and point loads.
     ///
     /// Places within [`SAME_PLACE`] of each other are one. Rising from 0 to U. Units: m.
-    pub fn break_points(&self) -> Vec<f64> {
+    pub(crate) fn break_points(&self) -> Vec<f64> {
         let length = self.belt.length();
         let supports = self.supports.iter().map(|support| support.at);
         let links = self.links.iter().flat_map(|link| [link.from, link.to]);
@@ -466,7 +466,7 @@ impl BeltSpec {
     }
 
     /// Length U of the spine. Units: m.
-    pub fn length(&self) -> f64 {
+    pub(crate) fn length(&self) -> f64 {
         self.segments.iter().map(SegmentSpec::length).sum()
     }
 
@@ -479,7 +479,7 @@ impl BeltSpec {
     }
 
     /// Flexural rigidity R_f of a belt that has one rigidity throughout; `None` of any other. Units: N·m².
-    pub fn rigidity_value(&self) -> Option<f64> {
+    pub(crate) fn rigidity_value(&self) -> Option<f64> {
         let own = self.own_rigidity();
         let mut values = self.flexible().map(|segment| match segment.rigidity() {
             Some(Rigidity::Constant(value)) => Some(*value),
@@ -492,26 +492,26 @@ impl BeltSpec {
 
     /// Flexural rigidity R_f of segments that have none of their own, from `rigidity`, the material or the layers.
     /// Units: N·m².
-    pub fn own_rigidity(&self) -> Option<f64> {
+    pub(crate) fn own_rigidity(&self) -> Option<f64> {
         self.rigidity
             .or_else(|| Some(self.laminate()?.rigidity * self.width))
     }
 
     /// Poisson's ratio ν: that of the material or the layers, else `poisson`, else [`DEFAULT_POISSON`].
-    pub fn poisson_value(&self) -> f64 {
+    pub(crate) fn poisson_value(&self) -> f64 {
         let own = self.laminate().map(|laminate| laminate.poisson);
         own.or(self.poisson).unwrap_or(DEFAULT_POISSON)
     }
 
     /// Mass per length of the spine: that of the material or the layers where they give one, else `density`.
     /// Units: kg/m.
-    pub fn density_value(&self) -> f64 {
+    pub(crate) fn density_value(&self) -> f64 {
         let own = self.laminate().and_then(|laminate| laminate.mass);
         own.map_or(self.density, |mass| mass * self.width)
     }
 
     /// Thickness of the sheet or of all layers; `None` where the belt is given by its rigidity.
-    pub fn thickness(&self) -> Option<f64> {
+    pub(crate) fn thickness(&self) -> Option<f64> {
         let sheet = self.material.as_ref().map(|sheet| sheet.thickness);
         let layers = || {
             Some(
@@ -526,7 +526,7 @@ impl BeltSpec {
     }
 
     /// Whether any part of the unloaded belt is bent.
-    pub fn has_natural_bend(&self) -> bool {
+    pub(crate) fn has_natural_bend(&self) -> bool {
         self.segments
             .iter()
             .any(|segment| self.natural_bend_of(segment) != 0.0)
@@ -539,7 +539,7 @@ impl BeltSpec {
     }
 
     /// Bend ω_ζ of an unloaded segment: its own, else the belt's; 0 of one that does not bend. Units: rad/m.
-    pub fn natural_bend_of(&self, segment: &SegmentSpec) -> f64 {
+    pub(crate) fn natural_bend_of(&self, segment: &SegmentSpec) -> f64 {
         match segment.is_flexible() {
             true => segment.natural_bend().unwrap_or(self.natural_bend),
             false => 0.0,
@@ -595,7 +595,7 @@ impl RigidityTable {
     /// # Panics
     ///
     /// If the table has no entries.
-    pub fn at(&self, u: f64) -> f64 {
+    pub(crate) fn at(&self, u: f64) -> f64 {
         let next = self.u.partition_point(|entry| *entry <= u);
         if next == 0 || next == self.u.len() {
             return self.value[next.saturating_sub(1)];
@@ -616,7 +616,7 @@ impl SegmentSpec {
     }
 
     /// Length along the spine; 0 of a corner. Units: m.
-    pub fn length(&self) -> f64 {
+    pub(crate) fn length(&self) -> f64 {
         match self {
             Self::Straight { length, .. } | Self::Arc { length, .. } | Self::Rigid { length } => {
                 *length
@@ -626,7 +626,7 @@ impl SegmentSpec {
     }
 
     /// In-plane (geodesic) curvature; 0 but of an arc. Units: rad/m.
-    pub fn curvature(&self) -> f64 {
+    pub(crate) fn curvature(&self) -> f64 {
         match self {
             Self::Arc { curvature, .. } => *curvature,
             Self::Straight { .. } | Self::Corner { .. } | Self::Rigid { .. } => 0.0,
@@ -634,7 +634,7 @@ impl SegmentSpec {
     }
 
     /// Angle by which the board turns at a point; 0 but of a corner. Units: rad.
-    pub fn angle(&self) -> f64 {
+    pub(crate) fn angle(&self) -> f64 {
         match self {
             Self::Corner { angle } => *angle,
             Self::Straight { .. } | Self::Arc { .. } | Self::Rigid { .. } => 0.0,
@@ -642,7 +642,7 @@ impl SegmentSpec {
     }
 
     /// The segment's own rigidity, where it has one.
-    pub fn rigidity(&self) -> Option<&Rigidity> {
+    pub(crate) fn rigidity(&self) -> Option<&Rigidity> {
         match self {
             Self::Straight { rigidity, .. } | Self::Arc { rigidity, .. } => rigidity.as_ref(),
             Self::Corner { .. } | Self::Rigid { .. } => None,
@@ -650,7 +650,7 @@ impl SegmentSpec {
     }
 
     /// Bend ω_ζ of the unloaded segment, where it has its own. Units: rad/m.
-    pub fn natural_bend(&self) -> Option<f64> {
+    pub(crate) fn natural_bend(&self) -> Option<f64> {
         match self {
             Self::Straight { natural_bend, .. } | Self::Arc { natural_bend, .. } => *natural_bend,
             Self::Corner { .. } | Self::Rigid { .. } => None,
@@ -658,14 +658,14 @@ impl SegmentSpec {
     }
 
     /// Whether the segment bends at all.
-    pub fn is_flexible(&self) -> bool {
+    pub(crate) fn is_flexible(&self) -> bool {
         matches!(self, Self::Straight { .. } | Self::Arc { .. })
     }
 }
 
 impl Place {
     /// Arc length from the start of a belt of this length; a number within [`SAME_PLACE`] of an end is that end.
-    pub fn arc_length(&self, length: f64) -> f64 {
+    pub(crate) fn arc_length(&self, length: f64) -> f64 {
         match *self {
             Self::Start => 0.0,
             Self::End => length,
@@ -676,7 +676,7 @@ impl Place {
     }
 
     /// Whether this is the start or the end of a belt of this length.
-    pub fn is_end(&self, length: f64) -> bool {
+    pub(crate) fn is_end(&self, length: f64) -> bool {
         let u = self.arc_length(length);
         u == 0.0 || u == length
     }
@@ -713,7 +713,7 @@ impl SupportSpec {
     }
 
     /// Components of the position that the support holds. Units: m.
-    pub fn components(&self) -> [Option<f64>; 3] {
+    pub(crate) fn components(&self) -> [Option<f64>; 3] {
         self.position.map_or([None; 3], |position| {
             position.map(|component| component.value())
         })
@@ -728,7 +728,7 @@ impl SupportSpec {
     /// Whether the rib is square to the spine, β = 0, on a belt of this length.
     ///
     /// Source: Eq. (45)–(50) for connectors.
-    pub fn is_square_rib(&self, length: f64) -> bool {
+    pub(crate) fn is_square_rib(&self, length: f64) -> bool {
         self.square_rib.unwrap_or_else(|| {
             self.at.is_end(length) && self.position.is_some() && self.has_orientation()
         })
@@ -741,7 +741,7 @@ impl SupportSpec {
 
 impl Component {
     /// The coordinate held; `None` where it is free. Units: m.
-    pub fn value(&self) -> Option<f64> {
+    pub(crate) fn value(&self) -> Option<f64> {
         match *self {
             Self::Held(value) => Some(value),
             Self::Free => None,

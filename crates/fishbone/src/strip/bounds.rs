@@ -5,12 +5,12 @@ use nalgebra::Vector2;
 use num_dual::DualNum;
 
 /// Active edges of an element, the largest number.
-pub const ACTIVE: usize = 3;
+pub(crate) const ACTIVE: usize = 3;
 /// Inequalities of an element, the largest number: those at the edges of its own stretch, then those at active edges.
-pub const BOUNDS: usize = 2 + ACTIVE;
+pub(crate) const BOUNDS: usize = 2 + ACTIVE;
 
 /// The edges of the board that bound the ribs of an element besides those of its own stretch.
-pub type ActiveEdges<W = f64> = [Option<Edge<W>>; ACTIVE];
+pub(crate) type ActiveEdges<W = f64> = [Option<Edge<W>>; ACTIVE];
 
 /// A line or an arc of the board's outline as seen from the foot of a rib, by the tangent nearest to the foot.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,7 +27,7 @@ pub struct Edge<W = f64> {
 
 impl Edge {
     /// A straight line.
-    pub fn line(direction: Vector2<f64>, distance: f64) -> Self {
+    pub(crate) fn line(direction: Vector2<f64>, distance: f64) -> Self {
         Self {
             direction,
             distance,
@@ -37,7 +37,7 @@ impl Edge {
     }
 
     /// The same edge in other units: lengths times a factor.
-    pub fn scaled(&self, factor: f64) -> Self {
+    pub(crate) fn scaled(&self, factor: f64) -> Self {
         Self {
             distance: self.distance * factor,
             curvature: self.curvature / factor,
@@ -51,7 +51,7 @@ impl<W: DualNum<Primitive = f64> + Copy> Edge<W> {
     ///
     /// A rib meets a tangent at v = c/(cos δ + β sin δ), so this is 1 − s v in other words; but it counts a rib so
     /// steep that it passes the edge by as crossing others.
-    pub fn slack<D: Scaled<W>>(&self, slope: D, s: D) -> D {
+    pub(crate) fn slack<D: Scaled<W>>(&self, slope: D, s: D) -> D {
         let (along, across) = (self.direction.x, self.direction.y);
         let nearest = slope * across - s * self.distance + along;
         if self.curvature.re() == 0.0 {
@@ -82,7 +82,7 @@ impl<W: DualNum<Primitive = f64> + Copy> Edge<W> {
 
 /// The inequalities of one element.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RibBounds<'a, W = f64> {
+pub(crate) struct RibBounds<'a, W = f64> {
     /// The strips of the element.
     pub strips: Strips<W>,
     /// Its active edges.
@@ -97,7 +97,7 @@ impl<'a, W: DualNum<Primitive = f64> + Copy> RibBounds<'a, W> {
     /// all the same, so that |s| ≤ 2/V holds everywhere.
     ///
     /// Source: Eq. (33), extended to curved belts
-    pub fn slacks<D: Scaled<W> + From<W>>(&self, slopes: [D; 2]) -> [D; BOUNDS] {
+    pub(crate) fn slacks<D: Scaled<W> + From<W>>(&self, slopes: [D; 2]) -> [D; BOUNDS] {
         let (mean, s) = self.strips.middle(slopes);
         let w = self.strips.half_width;
         let [minus, plus] = if self.strips.geodesic == 0.0 {
@@ -116,7 +116,7 @@ impl<'a, W: DualNum<Primitive = f64> + Copy> RibBounds<'a, W> {
     }
 
     /// The places among [`Self::slacks`] of the inequalities that there are.
-    pub fn places(&self) -> impl Iterator<Item = usize> + use<W> {
+    pub(crate) fn places(&self) -> impl Iterator<Item = usize> + use<W> {
         let active = self.edges.each_ref().map(Option::is_some);
         (0..BOUNDS).filter(move |place| *place < 2 || active[place - 2])
     }
@@ -124,12 +124,12 @@ impl<'a, W: DualNum<Primitive = f64> + Copy> RibBounds<'a, W> {
 
 impl RibBounds<'_> {
     /// Whether the slacks are linear in the slopes.
-    pub fn are_linear(&self) -> bool {
+    pub(crate) fn are_linear(&self) -> bool {
         self.strips.geodesic == 0.0 && *self.edges == [None; ACTIVE]
     }
 
     /// The slacks with derivatives.
-    pub fn slack_jets(&self, slopes: [f64; 2]) -> [SlopeJet; BOUNDS] {
+    pub(crate) fn slack_jets(&self, slopes: [f64; 2]) -> [SlopeJet; BOUNDS] {
         if self.are_linear() {
             let rate = self.strips.half_width / self.strips.length;
             let y = rate * (slopes[1] - slopes[0]);

@@ -128,7 +128,7 @@ where
 
 impl<T: DualNum<Primitive = f64> + Copy, const F: usize> Section<'_, T, F> {
     /// Natural bend of the element.
-    pub fn curl(&self) -> &Curl {
+    pub(crate) fn curl(&self) -> &Curl {
         &self.element.curl
     }
 }

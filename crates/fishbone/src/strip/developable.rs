@@ -33,7 +33,7 @@ pub struct Curl<W = f64> {
 
 /// A term of the density with its first and second derivatives by (bend, slope).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Term {
+pub(crate) struct Term {
     /// Value.
     pub value: f64,
     /// Gradient.
@@ -44,7 +44,7 @@ pub struct Term {
 
 impl EnergyModel {
     /// Whether the density depends on what the board is like across the spine.
-    pub fn knows_width(self) -> bool {
+    pub(crate) fn knows_width(self) -> bool {
         self == Self::Wunderlich
     }
 
@@ -55,7 +55,7 @@ impl EnergyModel {
     /// it and takes the bracket times sqrt(1+β²).
     ///
     /// Source: Eq. (29), (34), in β: written in ω_η/ω_ζ it is singular where the belt is not bent.
-    pub fn value<W: DualNum<Primitive = f64> + Copy, D: Scaled<W>>(
+    pub(crate) fn value<W: DualNum<Primitive = f64> + Copy, D: Scaled<W>>(
         self,
         bend: D,
         slope: D,
@@ -80,7 +80,7 @@ impl EnergyModel {
 
     /// The term in κ₁² at unit rigidity, before the width's factor.
     #[inline(always)]
-    pub fn bending(self, bend: f64, slope: f64) -> Term {
+    pub(crate) fn bending(self, bend: f64, slope: f64) -> Term {
         let c = self.slope_factor(slope);
         let half = 0.5 * bend * bend;
         Term {
@@ -91,7 +91,7 @@ impl EnergyModel {
     }
 
     /// The term linear in the bend, −k ω_ζ (1 + ν β²), before the width's factor.
-    pub fn mixed(self, bend: f64, slope: f64, curl: &Curl) -> Term {
+    pub(crate) fn mixed(self, bend: f64, slope: f64, curl: &Curl) -> Term {
         let [f, f1, f2] = self.stretch_factor(slope);
         let (nu, k) = (curl.poisson, -curl.bend);
         let q = 1.0 + nu * slope * slope;
@@ -105,7 +105,7 @@ impl EnergyModel {
     }
 
     /// The term of the natural bend alone, k²/2, before the width's factor.
-    pub fn natural(self, slope: f64, curl: &Curl) -> Term {
+    pub(crate) fn natural(self, slope: f64, curl: &Curl) -> Term {
         let [f, f1, f2] = self.stretch_factor(slope);
         let half = 0.5 * curl.bend * curl.bend;
         Term {

@@ -11,14 +11,14 @@ use nalgebra::{Matrix2, Matrix2x4, Matrix4, Vector3, Vector4};
 /// Torsion ω_η = −β ω_ζ.
 ///
 /// Source: Eq. (32)
-pub fn torsion(bend: f64, rib_slope: f64) -> f64 {
+pub(crate) fn torsion(bend: f64, rib_slope: f64) -> f64 {
     -rib_slope * bend
 }
 
 /// The twist of the pose per unit u, body axes: along η, and by the rates (κ_g, −β ω_ζ, ω_ζ).
 ///
 /// Source: Eq. (3), (4), (25), (32)
-pub fn strain(geodesic: f64, bend: f64, rib_slope: f64) -> Twist {
+pub(crate) fn strain(geodesic: f64, bend: f64, rib_slope: f64) -> Twist {
     Twist {
         translation: Vector3::y(),
         rotation: Vector3::new(geodesic, torsion(bend, rib_slope), bend),
@@ -26,7 +26,7 @@ pub fn strain(geodesic: f64, bend: f64, rib_slope: f64) -> Twist {
 }
 
 /// The motion along a piece of the spine, by a fourth-order Magnus step from the fields at its two ends.
-pub fn increment(length: f64, geodesic: f64, fields: &Vector4<f64>) -> Pose {
+pub(crate) fn increment(length: f64, geodesic: f64, fields: &Vector4<f64>) -> Pose {
     let gauss = GaussFields::at(fields);
     Pose::exp(&gauss.step(length, geodesic))
 }
@@ -48,7 +48,7 @@ pub struct Element {
 
 /// A function of the four unknowns with its derivatives.
 #[derive(Debug, Clone, Copy)]
-pub struct Jet {
+pub(crate) struct Jet {
     /// Value.
     pub value: f64,
     /// Gradient.
@@ -151,7 +151,7 @@ impl Element {
     }
 
     /// The strips between its ribs.
-    pub fn strips(&self) -> Strips {
+    pub(crate) fn strips(&self) -> Strips {
         Strips {
             half_width: self.half_width,
             geodesic: self.geodesic,
@@ -159,13 +159,8 @@ impl Element {
         }
     }
 
-    /// Pose increment by a fourth-order Magnus step.
-    pub fn increment(&self, fields: &Vector4<f64>) -> Pose {
-        increment(self.length, self.geodesic, fields)
-    }
-
     /// Energy, without derivatives.
-    pub fn energy(&self, model: EnergyModel, fields: &Vector4<f64>) -> f64 {
+    pub(crate) fn energy(&self, model: EnergyModel, fields: &Vector4<f64>) -> f64 {
         let gauss = GaussFields::at(fields);
         let across = if model.knows_width() {
             self.strips().across([fields[1], fields[3]])
@@ -180,7 +175,11 @@ impl Element {
     }
 
     /// What the width makes of the terms of the energy, with derivatives.
-    pub fn across_jets(&self, model: EnergyModel, fields: &Vector4<f64>) -> Across<SlopeJet> {
+    pub(crate) fn across_jets(
+        &self,
+        model: EnergyModel,
+        fields: &Vector4<f64>,
+    ) -> Across<SlopeJet> {
         match model.knows_width() {
             true => self.strips().across_jets([fields[1], fields[3]]),
             false => Across::PLAIN.map(SlopeJet::constant),
@@ -188,7 +187,7 @@ impl Element {
     }
 
     /// The part of the energy that the natural bend adds, with its derivatives.
-    pub fn curl_jet(
+    pub(crate) fn curl_jet(
         &self,
         model: EnergyModel,
         fields: &Vector4<f64>,
@@ -391,7 +390,7 @@ mod tests {
     #[test]
     fn test_increment_agrees_with_the_exponential_series() {
         for (element, w) in cases() {
-            let motion = element.increment(&w);
+            let motion = increment(element.length, element.geodesic, &w);
             let (e, p) = displacement_and_rotation(
                 element.length,
                 element.geodesic,
@@ -420,7 +419,7 @@ mod tests {
             for some in cases().chunks(LANES) {
                 let mut block = Block::default();
                 for (lane, (element, w)) in some.iter().enumerate() {
-                    let second = first * element.increment(w);
+                    let second = first * increment(element.length, element.geodesic, w);
                     let [a, b] = ends(w);
                     let loaded = Loaded {
                         element,
@@ -451,7 +450,7 @@ mod tests {
         first: &Pose,
         wrench: &NodeVector,
     ) {
-        let motion = element.increment(w);
+        let motion = increment(element.length, element.geodesic, w);
         let force: Vector3<f64> = wrench.fixed_rows::<3>(0).into_owned();
         let about_first = wrench.fixed_rows::<3>(3) - first.position.cross(&force);
         let (force_here, moment_here) =

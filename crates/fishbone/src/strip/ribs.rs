@@ -11,19 +11,19 @@ use std::ops::{Div, Mul};
 /// The strip between two ribs is (1 − v s) du wide at v, so ribs meet at v = 1/s. For κ_g = 0 it is the β' of the source.
 ///
 /// Source: Eq. (33), extended to curved belts
-pub fn rib_convergence(slope_rate: f64, geodesic: f64, rib_slope: f64) -> f64 {
+pub(crate) fn rib_convergence(slope_rate: f64, geodesic: f64, rib_slope: f64) -> f64 {
     slope_rate + geodesic * (1.0 + rib_slope * rib_slope)
 }
 
 /// The greatest |s| for which ribs do not cross inside the width, 2/V.
 ///
 /// Source: Eq. (33)
-pub fn rib_convergence_bound(width: f64) -> f64 {
+pub(crate) fn rib_convergence_bound(width: f64) -> f64 {
     2.0 / width
 }
 
 /// A number, it may be with derivatives, that numbers of another kind may multiply: the width is mostly a plain one.
-pub trait Scaled<W>:
+pub(crate) trait Scaled<W>:
     DualNum<Primitive = f64> + Copy + Mul<W, Output = Self> + Div<W, Output = Self>
 {
 }
@@ -36,7 +36,7 @@ impl<W, D> Scaled<W> for D where
 /// What the density's terms are multiplied by to hold for the whole width: integrals over v from the rib's one end v₋ to
 /// the other v₊, divided by V.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Across<T> {
+pub(crate) struct Across<T> {
     /// ∫ dv / (1 − v s), of the squared curvature.
     pub bending: T,
     /// ∫ dv, of the curvature.
@@ -47,7 +47,7 @@ pub struct Across<T> {
 
 impl Across<f64> {
     /// The narrow limit, and every straight belt whose ribs are parallel.
-    pub const PLAIN: Self = Self {
+    pub(crate) const PLAIN: Self = Self {
         bending: 1.0,
         length: 1.0,
         area: 1.0,
@@ -56,7 +56,7 @@ impl Across<f64> {
 
 impl<D: DualNum<Primitive = f64> + Copy> Across<D> {
     /// Of a straight belt, by y = sV/2.
-    pub fn straight(y: D) -> Self {
+    pub(crate) fn straight(y: D) -> Self {
         Self {
             bending: artanh_ratio(y),
             ..Across::PLAIN.map(D::from)
@@ -66,7 +66,7 @@ impl<D: DualNum<Primitive = f64> + Copy> Across<D> {
 
 impl<T: Copy> Across<T> {
     /// The same in another kind of number.
-    pub fn map<U>(&self, f: impl Fn(T) -> U) -> Across<U> {
+    pub(crate) fn map<U>(&self, f: impl Fn(T) -> U) -> Across<U> {
         Across {
             bending: f(self.bending),
             length: f(self.length),
@@ -77,7 +77,7 @@ impl<T: Copy> Across<T> {
 
 /// A function of the rib slopes at both ends of an element, with its derivatives by them.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SlopeJet {
+pub(crate) struct SlopeJet {
     /// Value.
     pub value: f64,
     /// Gradient.
@@ -88,7 +88,7 @@ pub struct SlopeJet {
 
 impl SlopeJet {
     /// A constant.
-    pub fn constant(value: f64) -> Self {
+    pub(crate) fn constant(value: f64) -> Self {
         Self {
             value,
             gradient: Vector2::zeros(),
@@ -124,7 +124,7 @@ impl From<Dual2SVec64<2>> for SlopeJet {
 
 /// The strips of one element: of half the width, in-plane curvature κ_g, and length.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Strips<W = f64> {
+pub(crate) struct Strips<W = f64> {
     /// Half the width, V/2.
     pub half_width: W,
     /// In-plane curvature κ_g of the flat board.
@@ -140,7 +140,7 @@ impl<W: DualNum<Primitive = f64> + Copy> Strips<W> {
     /// The mean rib slope and the rib convergence s = β' + κ_g (1+β²) there, which stand for the whole element.
     ///
     /// Source: Eq. (33), extended to curved belts
-    pub fn middle<D: DualNum<Primitive = f64> + Copy>(&self, slopes: [D; 2]) -> (D, D) {
+    pub(crate) fn middle<D: DualNum<Primitive = f64> + Copy>(&self, slopes: [D; 2]) -> (D, D) {
         let mean = (slopes[0] + slopes[1]) * 0.5;
         let rise = (slopes[1] - slopes[0]) / self.length;
         (mean, rise + (mean * mean + 1.0) * self.geodesic)
@@ -150,7 +150,7 @@ impl<W: DualNum<Primitive = f64> + Copy> Strips<W> {
     ///
     /// A rib so steep that it misses the inner edge of its own arc leaves the board farther along; there the root is
     /// continued smoothly.
-    pub fn ends<D: Scaled<W>>(&self, slope: D) -> [D; 2] {
+    pub(crate) fn ends<D: Scaled<W>>(&self, slope: D) -> [D; 2] {
         let w = self.half_width;
         let tightest = W::from(TIGHTEST) / w;
         let geodesic = match self.geodesic.abs() < tightest.re() {
@@ -166,7 +166,7 @@ impl<W: DualNum<Primitive = f64> + Copy> Strips<W> {
     }
 
     /// What the width makes of the density's terms, by slopes at both ends of the element.
-    pub fn across<D: Scaled<W>>(&self, slopes: [D; 2]) -> Across<D> {
+    pub(crate) fn across<D: Scaled<W>>(&self, slopes: [D; 2]) -> Across<D> {
         let (mean, s) = self.middle(slopes);
         let [minus, plus] = self.ends(mean);
         let length = (plus - minus) / (self.half_width * 2.0);
@@ -182,7 +182,7 @@ impl<W: DualNum<Primitive = f64> + Copy> Strips<W> {
 
 impl Strips {
     /// What the width makes of the density's terms, with derivatives.
-    pub fn across_jets(&self, slopes: [f64; 2]) -> Across<SlopeJet> {
+    pub(crate) fn across_jets(&self, slopes: [f64; 2]) -> Across<SlopeJet> {
         if self.geodesic == 0.0 {
             let rate = self.half_width / self.length;
             let y = rate * (slopes[1] - slopes[0]);

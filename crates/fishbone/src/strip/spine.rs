@@ -24,7 +24,7 @@ pub enum Piece {
 
 impl Piece {
     /// In-plane curvature κ_g of the flat board along it.
-    pub fn geodesic(self) -> f64 {
+    pub(crate) fn geodesic(self) -> f64 {
         match self {
             Self::Strip { geodesic } => geodesic,
             Self::Rigid | Self::Joint { .. } => 0.0,
@@ -32,7 +32,7 @@ impl Piece {
     }
 
     /// Angle by which the board turns at a point, from η towards ζ.
-    pub fn corner(self) -> f64 {
+    pub(crate) fn corner(self) -> f64 {
         match self {
             Self::Joint { angle } => angle,
             Self::Rigid | Self::Strip { .. } => 0.0,
@@ -61,7 +61,7 @@ pub struct Spine {
 
 /// The spine at one arc length.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SpinePoint {
+pub(crate) struct SpinePoint {
     /// Arc length.
     pub u: f64,
     /// Pose: frame and position.
@@ -133,7 +133,7 @@ impl Spine {
     /// Torsion ω_η = −β ω_ζ at every node.
     ///
     /// Source: Eq. (32)
-    pub fn torsion(&self) -> Vec<f64> {
+    pub(crate) fn torsion(&self) -> Vec<f64> {
         let fields = self.bend.iter().zip(&self.rib_slope);
         fields.map(|(&bend, &slope)| torsion(bend, slope)).collect()
     }
@@ -154,7 +154,7 @@ impl Spine {
     /// # Panics
     ///
     /// If the spine has no nodes.
-    pub fn at(&self, u: f64) -> SpinePoint {
+    pub(crate) fn at(&self, u: f64) -> SpinePoint {
         let next = self.u.partition_point(|&node| node < u);
         if next == self.u.len() {
             return self.node(next - 1);
@@ -170,7 +170,7 @@ impl Spine {
     /// # Panics
     ///
     /// If there is no such node.
-    pub fn node(&self, index: usize) -> SpinePoint {
+    pub(crate) fn node(&self, index: usize) -> SpinePoint {
         SpinePoint {
             u: self.u[index],
             pose: self.pose[index],

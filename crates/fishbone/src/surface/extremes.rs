@@ -20,7 +20,7 @@ pub struct HighestPoint {
 /// # Panics
 ///
 /// If the spine has no nodes.
-pub fn highest_point(spine: &Spine, direction: &Vector3<f64>) -> HighestPoint {
+pub(crate) fn highest_point(spine: &Spine, direction: &Vector3<f64>) -> HighestPoint {
     let nodes = (0..spine.u.len()).map(|node| spine.node(node));
     let peaks = (0..spine.elements()).flat_map(|element| peaks(spine, element, direction));
     let height = |point: &SpinePoint| point.pose.position.dot(direction);

@@ -9,7 +9,7 @@ use std::f64::consts::{PI, TAU};
 /// Twist plus writhe is the linking number of the two edges, half the number of half turns (Călugăreanu, White, Fuller).
 /// Where a belt passes through itself the number changes by four, and the frames alone tell it but for a multiple of
 /// four. Of several that the shape cannot tell apart, because it touches itself, it is the one the belt began with.
-pub fn half_turns(spine: &Spine) -> Option<i32> {
+pub(crate) fn half_turns(spine: &Spine) -> Option<i32> {
     const DOUBT: f64 = 0.6;
     let begun = spine.half_turns?;
     let by_frames = begun

@@ -12,7 +12,7 @@ use nalgebra::{Vector2, Vector3};
 /// Source: Eq. (31)
 ///
 /// Units: rad, in (−π/2, π/2)
-pub fn rib_angle(rib_slope: f64) -> f64 {
+pub(crate) fn rib_angle(rib_slope: f64) -> f64 {
     rib_slope.atan()
 }
 
@@ -101,7 +101,7 @@ impl Rib {
     /// The point v of the rib, x(u) + v (ζ − β η).
     ///
     /// Source: Eq. (20), (21)
-    pub fn point(&self, v: f64) -> Vector3<f64> {
+    pub(crate) fn point(&self, v: f64) -> Vector3<f64> {
         self.pose.transform(&Vector3::new(0.0, -v * self.slope, v))
     }
 
@@ -111,7 +111,7 @@ impl Rib {
     }
 
     /// `n` values of v, evenly from the −ζ end to the +ζ end.
-    pub fn stations(&self, n: usize) -> impl Iterator<Item = f64> + use<> {
+    pub(crate) fn stations(&self, n: usize) -> impl Iterator<Item = f64> + use<> {
         let (minus, plus) = (self.v_minus, self.v_plus);
         (0..n).map(move |i| {
             let fraction = i as f64 / (n.max(2) - 1) as f64;

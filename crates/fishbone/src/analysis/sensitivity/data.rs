@@ -143,7 +143,7 @@ mod tests {
     use crate::board::samples::{Part, Plan};
     use crate::geometry::Pose;
     use crate::strip::density::{Derivatives, Loaded};
-    use crate::strip::element::Jet;
+    use crate::strip::element::{Jet, increment};
     use crate::strip::kernel::Block;
     use nalgebra::Vector6;
     use num_dual::Dual64;
@@ -168,7 +168,10 @@ mod tests {
         let loaded = Loaded {
             element,
             fields: [&a, &b],
-            poses: [&Pose::identity(), &element.increment(fields)],
+            poses: [
+                &Pose::identity(),
+                &increment(element.length, element.geodesic, fields),
+            ],
             wrench: &Vector6::zeros(),
         };
         block.set(0, &model, &loaded);

@@ -12,10 +12,10 @@ use serde::Deserialize;
 
 /// Longest TOML text read, in bytes. Its reader takes up to 240 bytes of memory for each, so that this bounds the
 /// memory by half a gigabyte.
-pub const LONGEST_TOML: usize = 2_000_000;
+pub(crate) const LONGEST_TOML: usize = 2_000_000;
 
 /// Longest JSON text read, in bytes. Its reader takes some tens of bytes of memory for each.
-pub const LONGEST_JSON: usize = 16_000_000;
+pub(crate) const LONGEST_JSON: usize = 16_000_000;
 
 const LEAST_TOML: &str = r#"at least belt = { width = 0.1, rigidity = 1.0, segments = [{ kind = "straight", length = 1.0 }] }"#;
 const LEAST_JSON: &str = r#"at least {"belt": {"width": 0.1, "rigidity": 1.0, "segments": [{"kind": "straight", "length": 1.0}]}}"#;

@@ -23,7 +23,7 @@ pub struct NodeLoad {
 
 impl DeadForce {
     /// Its potential −F · (x + R l).
-    pub fn potential(&self, pose: &Pose) -> f64 {
+    pub(crate) fn potential(&self, pose: &Pose) -> f64 {
         -self.force.dot(&pose.transform(&self.lever))
     }
 

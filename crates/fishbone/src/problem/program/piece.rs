@@ -24,7 +24,7 @@ pub enum Piece {
 
 impl Piece {
     /// Length along the spine.
-    pub fn length(&self) -> f64 {
+    pub(crate) fn length(&self) -> f64 {
         match self {
             Self::Strip(element) => element.length,
             Self::Rigid { length } => *length,

@@ -22,7 +22,7 @@ pub enum Hold {
 
 impl Hold {
     /// The prescribed frame, free to turn about an axis or not.
-    pub fn frame(&self) -> Option<UnitQuaternion<f64>> {
+    pub(crate) fn frame(&self) -> Option<UnitQuaternion<f64>> {
         match self {
             Self::Free => None,
             Self::Frame(frame) | Self::Hinge { frame, .. } => Some(*frame),
@@ -222,7 +222,7 @@ pub(crate) struct Turn {
 
 impl NodeSupport {
     /// The prescribed position, where all of it is.
-    pub fn point(&self) -> Option<Vector3<f64>> {
+    pub(crate) fn point(&self) -> Option<Vector3<f64>> {
         let [x, y, z] = self.position;
         Some(Vector3::new(x?, y?, z?))
     }
