@@ -1,7 +1,8 @@
 //! Many solves at once, over all cores.
 
-use crate::equilibrium::{Equilibrium, SIGNAL_INTERVAL};
+use crate::equilibrium::Equilibrium;
 use crate::scenario::Scenario;
+use crate::signals::SIGNAL_INTERVAL;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use std::ops::ControlFlow;

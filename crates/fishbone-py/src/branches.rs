@@ -1,7 +1,8 @@
 //! `_core.branches`.
 
-use crate::equilibrium::{Equilibrium, SIGNAL_INTERVAL};
+use crate::equilibrium::Equilibrium;
 use crate::scenario::Scenario;
+use crate::signals::SIGNAL_INTERVAL;
 use fishbone::analysis::branches::{self as core, SearchSettings, Watch};
 use pyo3::prelude::*;
 use rayon::prelude::*;

@@ -1,9 +1,10 @@
-//! `_core.Equilibrium` and the solve that makes it.
+//! `_core.Equilibrium`.
 
 use crate::array::{self, Grid, Points, Scalars, Triangles};
 use crate::errors::raised;
 use crate::scenario::Scenario;
 use crate::sensitivity::Sensitivity;
+use crate::signals::Signals;
 use crate::tracker::Tracker;
 use fishbone::analysis::margin::MarginSettings;
 use fishbone::board::curve::Curve;
@@ -15,51 +16,10 @@ use fishbone::strip::spine::Piece;
 use fishbone::surface::{self, Rib};
 use nalgebra::{Vector2, Vector3, Vector6};
 use numpy::IntoPyArray;
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::convert::Infallible;
 use std::ops::ControlFlow;
-use std::time::{Duration, Instant};
-
-/// Short enough for Ctrl-C to feel immediate, long enough to cost nothing.
-pub(crate) const SIGNAL_INTERVAL: Duration = Duration::from_millis(50);
-
-/// Solves a scenario with the GIL released.
-///
-/// Errors: whatever a signal handler raises, `KeyboardInterrupt` first of all.
-#[pyfunction]
-pub(crate) fn solve(py: Python<'_>, scenario: &Scenario) -> PyResult<Equilibrium> {
-    let mut signals = Signals::new();
-    let found = py.detach(|| Equilibrium::timed(&scenario.0, &mut || signals.proceed()));
-    match signals.raised {
-        Some(error) => Err(error),
-        None => Ok(found),
-    }
-}
-
-/// Solves a scenario from a shape with the GIL released: bend and rib slope at equal steps of the arc length.
-///
-/// Shapes: (m,) both.
-/// Errors: `ValueError`, one line, where these are no shape; whatever a signal handler raises, `KeyboardInterrupt` first of
-/// all.
-#[pyfunction]
-pub(crate) fn solve_from(
-    py: Python<'_>,
-    scenario: &Scenario,
-    bend: Vec<f64>,
-    rib_slope: Vec<f64>,
-) -> PyResult<Equilibrium> {
-    let mut signals = Signals::new();
-    let found = py.detach(|| {
-        Equilibrium::try_of(|| {
-            fishbone::solve::solve_from(&scenario.0, &bend, &rib_slope, &mut || signals.proceed())
-        })
-    });
-    match signals.raised {
-        Some(error) => Err(error),
-        None => found.map_err(|error| PyValueError::new_err(error.to_string())),
-    }
-}
+use std::time::Instant;
 
 impl Equilibrium {
     /// Solves and takes the time.
@@ -79,51 +39,15 @@ impl Equilibrium {
     }
 
     /// The same of what may not be found.
-    fn try_of<E>(find: impl FnOnce() -> Result<equilibrium::Equilibrium, E>) -> Result<Self, E> {
+    pub(crate) fn try_of<E>(
+        find: impl FnOnce() -> Result<equilibrium::Equilibrium, E>,
+    ) -> Result<Self, E> {
         let start = Instant::now();
         let solved = find()?;
         Ok(Self {
             solved,
             solve_time: start.elapsed().as_secs_f64(),
         })
-    }
-}
-
-/// Asks Python now and then whether a signal has arrived.
-pub(crate) struct Signals {
-    asked: Instant,
-    pub(crate) raised: Option<PyErr>,
-}
-
-impl Signals {
-    pub(crate) fn new() -> Self {
-        Self {
-            asked: Instant::now(),
-            raised: None,
-        }
-    }
-
-    pub(crate) fn proceed(&mut self) -> ControlFlow<()> {
-        self.proceed_with(|_| Ok(()))
-    }
-
-    /// The same, with something to be told to Python whenever it is asked.
-    pub(crate) fn proceed_with(
-        &mut self,
-        tell: impl FnOnce(Python<'_>) -> PyResult<()>,
-    ) -> ControlFlow<()> {
-        if self.raised.is_none() && self.asked.elapsed() >= SIGNAL_INTERVAL {
-            self.asked = Instant::now();
-            let asked = Python::attach(|py| {
-                py.check_signals()?;
-                tell(py)
-            });
-            self.raised = asked.err();
-        }
-        match self.raised {
-            Some(_) => ControlFlow::Break(()),
-            None => ControlFlow::Continue(()),
-        }
     }
 }
 

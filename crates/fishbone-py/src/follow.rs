@@ -1,9 +1,10 @@
 //! `_core.Path`, `_core.follow` and `_core.Diagram`.
 
 use crate::array::{self, Grid, Points, Scalars};
-use crate::equilibrium::{Equilibrium, Signals};
+use crate::equilibrium::Equilibrium;
 use crate::errors::raised;
 use crate::scenario::Scenario;
+use crate::signals::Signals;
 use fishbone::analysis::continuation::{self as core, Settings, Summary};
 use fishbone::analysis::path::{self, Motion};
 use fishbone::names::Named;

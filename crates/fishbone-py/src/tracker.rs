@@ -1,9 +1,10 @@
 //! `_core.Tracker`.
 
 use crate::array::{self, Grid, Points, Scalars};
-use crate::equilibrium::{Equilibrium, Signals};
+use crate::equilibrium::Equilibrium;
 use crate::errors::raised;
 use crate::scenario::Scenario;
+use crate::signals::Signals;
 use fishbone::analysis::tracking as core;
 use fishbone::names::Named;
 use nalgebra::Vector3;

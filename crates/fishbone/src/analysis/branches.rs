@@ -6,9 +6,11 @@
 //! continued until it is zero again, leads to another equilibrium, of one negative mode more or less. From a saddle the energy
 //! falls to both sides of its lowest mode.
 
+mod settings;
 mod starts;
 
-use crate::analysis::symmetry::{SAME, are_images};
+pub use settings::{SearchSettings, Wave};
+
 use crate::equilibrium::{Equilibrium, Status, minimum_from, minimum_next_to, of_solution};
 use crate::problem::Problem;
 use crate::problem::program::{BeltPoint, BeltProgram};
@@ -21,139 +23,6 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// A mode of the programme.
 type Mode = stagewise::Mode<8>;
-
-/// What the search does, and what it takes for the same; by default what finds all that is known to be there.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SearchSettings {
-    /// Waves of bend, laid over every arch and the straight belt; amplitudes in 1/U.
-    pub bend_waves: Vec<Wave>,
-    /// Waves of rib slope, each laid over with every wave of bend; amplitudes, a number.
-    pub slope_waves: Vec<Wave>,
-    /// Sums of waves from which the search starts as well, a number.
-    pub sums: usize,
-    /// Minima that are perturbed, the largest number.
-    pub perturbed: usize,
-    /// Modes along which a minimum is perturbed, a number.
-    pub perturbed_modes: usize,
-    /// Displacements of a minimum along each of these, in norms of the mode.
-    pub perturbations: Vec<f64>,
-    /// Equilibria that are continued in modal loads, the largest number.
-    pub continued: usize,
-    /// Equilibria continued at a time, so that lower ones that are found meanwhile come first; a number.
-    pub at_a_time: usize,
-    /// Modes along which an equilibrium is loaded, by its number of negative modes; one of more is not reported; a number each.
-    pub loaded_modes: [usize; 3],
-    /// Displacement from a saddle along its lowest mode, from where it is downhill, in norms of the mode.
-    pub off_saddle: f64,
-    /// Elements of the mesh that confirms an equilibrium, in those of the scenario.
-    pub refinement: usize,
-    /// Difference of energy up to which two equilibria on one mesh may be the same, a share.
-    pub same_level: f64,
-    /// Distance of nodes up to which two equilibria on one mesh may be the same, in U.
-    pub same_distance: f64,
-    /// Difference of energy up to which two equilibria on different meshes may be the same, a share.
-    pub like_level: f64,
-    /// Distance of nodes up to which two equilibria on different meshes may be the same, in U.
-    pub like_distance: f64,
-    /// Bending energy of a belt that counts as flat, in the scenario's unit of energy.
-    pub flat_energy: f64,
-    /// Bulge by which one mirror image is the higher, in U.
-    pub higher: f64,
-    /// Miss of the supports up to which a mirror image meets them, lengths in U and angles in rad.
-    pub miss: f64,
-}
-
-/// A wave along the belt.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Wave {
-    /// Half waves over the length of the belt, a number.
-    pub half_waves: f64,
-    /// Largest value, in the unit of what waves.
-    pub amplitude: f64,
-}
-
-impl Default for SearchSettings {
-    fn default() -> Self {
-        let waves = |waves: &[(f64, f64)]| {
-            let wave = |&(half_waves, amplitude)| Wave {
-                half_waves,
-                amplitude,
-            };
-            waves.iter().map(wave).collect()
-        };
-        Self {
-            bend_waves: waves(&[
-                (0.0, 0.0),
-                (0.0, 4.0),
-                (0.0, -4.0),
-                (1.0, 4.0),
-                (1.0, -4.0),
-                (2.0, 8.0),
-                (2.0, -8.0),
-                (3.0, 12.0),
-                (3.0, -12.0),
-            ]),
-            slope_waves: waves(&[(1.0, 0.0), (1.0, 0.5), (1.0, -0.5), (2.0, 0.5), (2.0, -0.5)]),
-            sums: 4000,
-            perturbed: 96,
-            perturbed_modes: 4,
-            perturbations: vec![0.1, -0.1, 0.3, -0.3],
-            continued: 16,
-            at_a_time: 4,
-            loaded_modes: [6, 4, 0],
-            off_saddle: 0.01,
-            refinement: 2,
-            same_level: 1e-4,
-            same_distance: SAME,
-            like_level: 0.02,
-            like_distance: 0.03,
-            flat_energy: 1e-6,
-            higher: 1e-9,
-            miss: 1e-6,
-        }
-    }
-}
-
-impl SearchSettings {
-    /// Most negative modes of an equilibrium that is reported.
-    fn highest_index(&self) -> usize {
-        self.loaded_modes.len() - 1
-    }
-
-    /// Whether two equilibria are the same but for a symmetry.
-    fn is_same(&self, a: &Equilibrium, b: &Equilibrium) -> bool {
-        self.is_within(a, b, self.same_level, self.same_distance)
-    }
-
-    /// Whether two equilibria may be the same but for a symmetry and the mesh.
-    fn is_like(&self, a: &Equilibrium, b: &Equilibrium) -> bool {
-        self.is_within(a, b, self.like_level, self.like_distance)
-    }
-
-    /// Whether two equilibria differ by no more than a share of the energy and a distance in U, and in no number of negative
-    /// modes.
-    fn is_within(&self, a: &Equilibrium, b: &Equilibrium, share: f64, distance: f64) -> bool {
-        let solved = || Some((a.solved.as_ref()?, b.solved.as_ref()?));
-        let is_level = (a.energy - b.energy).abs() <= share * self.size(a).max(self.size(b));
-        let index = |e: &Equilibrium| e.stability.map(|s| s.negative_modes);
-        is_level
-            && index(a) == index(b)
-            && solved()
-                .is_some_and(|(a, b)| are_images(&a.at.point.poses, &b.at.point.poses, distance))
-    }
-
-    /// What differences of energy are measured by: that of bending, as the zero of a load's potential is anywhere; of a flat
-    /// belt next to nothing.
-    fn size(&self, equilibrium: &Equilibrium) -> f64 {
-        let unit = equilibrium.problem.units().energy;
-        equilibrium.elastic_energy.max(self.flat_energy * unit)
-    }
-
-    /// Whether one of two mirror images bulges more as the scenario asks.
-    fn is_higher(&self, one: &Equilibrium, other: &Equilibrium) -> bool {
-        height(one) > height(other) + self.higher * one.spine.length()
-    }
-}
 
 /// Runs `task(i)` for every i below a number, in any order and on any thread.
 pub(crate) type Run<'a> = dyn Fn(usize, &(dyn Fn(usize) + Sync)) + 'a;

@@ -1,8 +1,13 @@
 //! Where the search for an equilibrium starts: an arch on the side of the bulge, with ribs that do not cross.
 
+mod headings;
+mod ribs;
+
 use crate::geometry::{Pose, exp, log};
-use crate::problem::program::{BeltPoint, BeltProgram, NodeSupport, Piece};
+use crate::problem::program::{BeltPoint, BeltProgram, NodeSupport};
+use headings::Headings;
 use nalgebra::{Matrix3, UnitQuaternion, Vector2, Vector3};
+use ribs::calm_slopes;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Samples of the arch when its reach is measured.
@@ -125,155 +130,6 @@ fn arched(program: &BeltProgram, arch: &Arch, slopes: &[f64], frame: &Matrix3<f6
     };
     program.settle(&mut point);
     point
-}
-
-/// Rib slopes far from crossing, square where they are held so: the best of those in which the ribs turn with the spine,
-/// but more gently, over as many widths as it takes.
-///
-/// Parallel ribs never cross, whatever the spine does; ribs square to the spine cross at every bend of the board.
-pub(crate) fn calm_slopes(program: &BeltProgram) -> Vec<f64> {
-    const WIDTHS: [f64; 7] = [0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0];
-    const CALM: f64 = 0.3;
-    let board = Headings::of(program);
-    let width = program
-        .elements()
-        .map(|(_, element)| 2.0 * element.half_width)
-        .fold(0.0, f64::max);
-    let mut best = (f64::NEG_INFINITY, vec![0.0; board.u.len()]);
-    let smooth = WIDTHS.iter().map(|widths| board.slopes(widths * width));
-    let mitred = WIDTHS
-        .iter()
-        .map(|widths| mitred_slopes(program, widths * width));
-    for slopes in smooth.chain(mitred) {
-        let mut point = BeltPoint {
-            fields: slopes
-                .iter()
-                .map(|slope| Vector2::new(0.0, *slope))
-                .collect(),
-            poses: vec![Pose::identity(); slopes.len()],
-        };
-        program.settle(&mut point);
-        let slack = program.least_slack(&point);
-        if slack > best.0 {
-            best = (slack, point.fields.iter().map(|fields| fields[1]).collect());
-        }
-        if best.0 >= CALM {
-            break;
-        }
-    }
-    best.1
-}
-
-/// Rib slopes along the mitre at every bend, square where held so, linear in between and square beyond a reach of both.
-fn mitred_slopes(program: &BeltProgram, reach: f64) -> Vec<f64> {
-    let u = program.nodes();
-    let mut anchors: Vec<(f64, f64)> = Vec::new();
-    let mut anchor = |u: f64, slope: f64| {
-        if let Some((before, _)) = anchors.last().copied()
-            && u - before > 2.0 * reach
-        {
-            anchors.extend([(before + reach, 0.0), (u - reach, 0.0)]);
-        }
-        anchors.push((u, slope));
-    };
-    anchor(u[0], 0.0);
-    for (k, piece) in program.pieces.iter().enumerate() {
-        let mitre = match piece {
-            Piece::Joint { angle } => (0.5 * angle).tan(),
-            Piece::Strip(_) | Piece::Rigid { .. } => 0.0,
-        };
-        if mitre != 0.0 || program.fixed_slope(k).is_some() {
-            anchor(u[k], program.fixed_slope(k).unwrap_or(mitre));
-        }
-        if mitre != 0.0 {
-            anchor(u[k + 1], program.fixed_slope(k + 1).unwrap_or(-mitre));
-        }
-    }
-    anchor(u[u.len() - 1], 0.0);
-    let at = |(node, u): (usize, &f64)| {
-        let after_joint = node > 0 && matches!(program.pieces[node - 1], Piece::Joint { .. });
-        let next = anchors.partition_point(|(place, _)| place < u || (after_joint && place == u));
-        let next = next.clamp(1, anchors.len() - 1);
-        let ((a, left), (b, right)) = (anchors[next - 1], anchors[next]);
-        let share = if b > a { (u - a) / (b - a) } else { 1.0 };
-        left + share.clamp(0.0, 1.0) * (right - left)
-    };
-    u.iter().enumerate().map(at).collect()
-}
-
-/// Which way the spine of the flat board heads.
-struct Headings {
-    u: Vec<f64>,
-    /// Angle from η at the start towards ζ, at every node.
-    heading: Vec<f64>,
-    /// Its integral from the start.
-    integral: Vec<f64>,
-    /// Arc lengths where the rib is held.
-    held: Vec<f64>,
-}
-
-impl Headings {
-    fn of(program: &BeltProgram) -> Self {
-        let u = program.nodes();
-        let (mut heading, mut integral) = (vec![0.0], vec![0.0]);
-        for (k, piece) in program.pieces.iter().enumerate() {
-            let turn = match piece {
-                Piece::Strip(element) => element.geodesic * element.length,
-                Piece::Joint { angle } => *angle,
-                Piece::Rigid { .. } => 0.0,
-            };
-            integral.push(integral[k] + piece.length() * (heading[k] + 0.5 * turn));
-            heading.push(heading[k] + turn);
-        }
-        let held = (0..u.len()).filter(|node| program.fixed_slope(*node).is_some());
-        Self {
-            held: held.map(|node| u[node]).collect(),
-            heading,
-            integral,
-            u,
-        }
-    }
-
-    /// Rib slopes of which the flat direction is the mean heading within a reach on either side, less near held ribs.
-    fn slopes(&self, reach: f64) -> Vec<f64> {
-        const SHORTEST: f64 = 1e-6;
-        let slope = |(u, heading): (&f64, &f64)| {
-            let reach = reach.max(SHORTEST).min(self.to_held(*u));
-            let mean = (self.integral_at(u + reach) - self.integral_at(u - reach)) / (2.0 * reach);
-            match reach < SHORTEST {
-                true => 0.0,
-                false => (mean - heading).clamp(-1.5, 1.5).tan(),
-            }
-        };
-        self.u.iter().zip(&self.heading).map(slope).collect()
-    }
-
-    /// Way to the nearest held rib.
-    fn to_held(&self, u: f64) -> f64 {
-        let ways = self.held.iter().map(|held| (held - u).abs());
-        ways.fold(f64::INFINITY, f64::min)
-    }
-
-    /// Integral of the heading from the start, going on straight beyond the ends.
-    fn integral_at(&self, u: f64) -> f64 {
-        let last = self.u.len() - 1;
-        let k = self.u.partition_point(|node| *node <= u);
-        if k == 0 {
-            return u * self.heading[0];
-        }
-        let past = u - self.u[k - 1];
-        if k > last {
-            return self.integral[last] + past * self.heading[last];
-        }
-        let length = self.u[k] - self.u[k - 1];
-        let rise = self.heading[k] - self.heading[k - 1];
-        self.integral[k - 1] + past * (self.heading[k - 1] + 0.5 * rise * past / length)
-    }
-
-    /// Whether the board is straight all along.
-    fn is_straight(&self) -> bool {
-        self.heading.iter().all(|heading| *heading == 0.0)
-    }
 }
 
 /// Disturbs a start or a saddle out of its symmetry by a smooth twist and a sway, `share` of what the rib bound allows.
@@ -535,6 +391,7 @@ fn place(point: &mut BeltPoint, start: Option<&NodeSupport>, end: Option<&NodeSu
 mod tests {
     use super::*;
     use crate::problem::program::Hold;
+    use crate::problem::program::Piece;
     use crate::strip::developable::{Curl, EnergyModel};
     use crate::strip::element::Element;
 
