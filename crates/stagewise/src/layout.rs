@@ -171,6 +171,11 @@ impl Layout {
         self.stage_rows[self.stages()]
     }
 
+    /// First row of the inequalities between pairs.
+    pub(crate) fn first_pair_row(&self) -> usize {
+        self.inequalities() - rows(&self.inequalities_between)
+    }
+
     /// Rows of the inequalities of a stage.
     pub fn stage_rows(&self, stage: usize) -> Range<usize> {
         self.stage_rows[stage]..self.stage_rows[stage + 1]

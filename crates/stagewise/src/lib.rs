@@ -15,23 +15,25 @@
 mod interior_point;
 mod layout;
 mod linear;
+mod linearisation;
 mod path;
 mod program;
 
 pub use interior_point::{Outcome, Residuals, Settings, Solution, assess, minimise};
 pub use layout::{Block, Layout};
 pub use linear::chain::{
-    ByControls, Chain, Diagonal, Factor, NodeMatrix, NodeTerm, NodeVector, Stage, StageMatrix,
+    ByControls, Chain, Diagonal, Factor, NodeMatrix, NodeTerm, NodeVector, Stage,
 };
 pub use linear::{
-    Direction, Inertia, Mode, Response, Singular, TooConcave, lowest_modes, moved,
-    redundant_equalities,
+    Direction, Inertia, Mode, PairMatrix, Response, Singular, StageMatrix, TooConcave,
+    lowest_modes, moved, redundant_equalities,
 };
+pub use linearisation::Linearisation;
 pub use path::{
     Continuation, Curve, End, Event, Events, Family, FollowSettings, Followed, Follower, Pace,
     Station, Turn, by_differences, over_modal_load, settle,
 };
-pub use program::{Distance, Linearisation, Multipliers, Program, Scales, Stationary, Values};
+pub use program::{Distance, Multipliers, Program, Scales, Stationary, Values};
 
 /// The larger of two numbers; NaN where one of them is, so that no residual hides one.
 fn larger(a: f64, b: f64) -> f64 {

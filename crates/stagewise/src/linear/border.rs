@@ -2,10 +2,14 @@
 
 use super::TooConcave;
 use super::chain::{Chain, Factor, NodeVector};
-use crate::program::product;
+use super::pair_matrix::Square;
+use crate::linearisation::product;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-/// One constraint of the border.
+/// One row of the border: a constraint, or a square in the second derivative of one.
+///
+/// A row with gradient r and compliance c adds rᵀr/c to the second derivative of the chain: an inequality has the
+/// compliance slack over multiplier, and f times a square is a row of compliance 1/f.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Row<const N: usize> {
     /// The nodes that it touches.
@@ -15,20 +19,36 @@ pub(super) struct Row<const N: usize> {
     /// By how much it changes under a unit multiplier, besides what the chain does: zero of an equality, slack over
     /// multiplier of an inequality.
     pub(super) compliance: f64,
+    /// Whether it is an equality, whose compliance may be softened.
+    is_equality: bool,
 }
 
 impl<const N: usize> Row<N> {
-    /// A constraint of a single node.
+    /// An equality of a single node.
     pub(super) fn at(node: usize, by: NodeVector<N>) -> Self {
-        Self::between([node; 2], [by, NodeVector::zeros()])
+        Self {
+            by: [by, NodeVector::zeros()],
+            ..Self::between([node; 2], true)
+        }
     }
 
-    /// A constraint between two nodes.
-    pub(super) fn between(nodes: [usize; 2], by: [NodeVector<N>; 2]) -> Self {
+    /// Room for a constraint between two nodes.
+    pub(super) fn between(nodes: [usize; 2], is_equality: bool) -> Self {
+        Self {
+            nodes,
+            by: [NodeVector::zeros(); 2],
+            compliance: 0.0,
+            is_equality,
+        }
+    }
+
+    /// A factor times the square of a linear form in the unknowns of two nodes.
+    pub(super) fn square(nodes: [usize; 2], (factor, by): Square<N>) -> Self {
         Self {
             nodes,
             by,
-            compliance: 0.0,
+            compliance: factor.recip(),
+            is_equality: false,
         }
     }
 
@@ -39,7 +59,7 @@ impl<const N: usize> Row<N> {
     }
 }
 
-/// The constraints between pairs of nodes, and how they are eliminated after the chain.
+/// The rows between pairs of nodes, and how they are eliminated after the chain.
 #[derive(Debug, Clone)]
 pub(super) struct Border<const N: usize> {
     pub(super) rows: Vec<Row<N>>,
@@ -59,8 +79,25 @@ impl<const N: usize> Border<N> {
         }
     }
 
-    /// Eliminates the rows after the chain, each with `softness` added to its compliance; gives the number of the chain's
-    /// concave directions that the rows hold. Rows that follow from others bear nothing.
+    /// Replaces all rows but the first ones.
+    pub(super) fn replace_beyond(&mut self, kept: usize, rows: impl Iterator<Item = Row<N>>) {
+        self.rows.truncate(kept);
+        self.rows.extend(rows);
+        let answer = || vec![NodeVector::zeros(); self.gradient.len()];
+        self.answers.resize_with(self.rows.len(), answer);
+    }
+
+    /// The number of rows that by themselves are concave: those of negative compliance.
+    pub(super) fn concave_rows(&self) -> usize {
+        let rows = self.rows.iter();
+        rows.filter(|row| row.compliance < 0.0).count()
+    }
+
+    /// Eliminates the rows after the chain, each equality with `softness` added to its compliance; gives the number of
+    /// concave directions, of chain and rows, that the rows hold. Rows that follow from others bear nothing.
+    ///
+    /// With chain K, gradients R of the rows and compliances C, the second derivative that is left has as many negative
+    /// eigenvalues as K and C have together, less those of C + R K⁻¹ Rᵀ: both orders of elimination count the same.
     ///
     /// Errors: [`TooConcave`] where the compliance is not finite: the chain has a direction that costs nothing.
     pub(super) fn factorise<const U: usize>(
@@ -110,12 +147,13 @@ impl<const N: usize> Border<N> {
         }
         let count = self.rows.len();
         let compliance = DMatrix::from_fn(count, count, |i, j| {
-            let own = if i == j {
-                softness + self.rows[i].compliance
-            } else {
-                0.0
+            let row = &self.rows[i];
+            let own = match (i == j, row.is_equality) {
+                (true, true) => softness + row.compliance,
+                (true, false) => row.compliance,
+                _ => 0.0,
             };
-            own - self.rows[i].change(&self.answers[j])
+            own - row.change(&self.answers[j])
         });
         0.5 * (&compliance + compliance.transpose())
     }

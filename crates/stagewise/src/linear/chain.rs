@@ -17,6 +17,7 @@ mod tests;
 
 pub use factor::Factor;
 
+use super::pair_matrix::StageMatrix;
 use columns::{add_scaled, dot_states};
 use nalgebra::{SMatrix, SVector};
 
@@ -76,37 +77,6 @@ impl<const U: usize, const N: usize> Stage<U, N> {
         }
         next[Self::X..].copy_from_slice(&second);
         next
-    }
-}
-
-/// A quadratic form in the controls at both ends of a stage.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct StageMatrix<const U: usize> {
-    /// Second derivative by the first controls.
-    pub first: SMatrix<f64, U, U>,
-    /// By the first controls (rows) and the second ones (columns).
-    pub mixed: SMatrix<f64, U, U>,
-    /// By the second controls.
-    pub second: SMatrix<f64, U, U>,
-}
-
-impl<const U: usize> StageMatrix<U> {
-    /// A form that is zero.
-    pub fn zeros() -> Self {
-        Self {
-            first: SMatrix::zeros(),
-            mixed: SMatrix::zeros(),
-            second: SMatrix::zeros(),
-        }
-    }
-
-    /// Adds a factor times the square of a linear form.
-    #[inline(always)]
-    pub fn add_square(&mut self, factor: f64, [first, second]: &[SVector<f64, U>; 2]) {
-        let (by_first, by_second) = (factor * first, factor * second);
-        self.first += by_first * first.transpose();
-        self.mixed += by_first * second.transpose();
-        self.second += by_second * second.transpose();
     }
 }
 

@@ -5,7 +5,8 @@
 
 use super::chain::ByControls;
 use super::kkt::Kkt;
-use crate::program::{Linearisation, Scales, Values};
+use crate::linearisation::Linearisation;
+use crate::program::{Scales, Values};
 use nalgebra::SMatrix;
 
 /// Eigenvalues below this, in the unit of [`Scales::eigenvalue`], are not told from zero.
@@ -111,6 +112,23 @@ impl<const X: usize, const U: usize, const N: usize> Linearisation<X, U, N> {
         for term in &self.diagonal.nodes {
             for (i, most) in most[term.node].iter_mut().enumerate() {
                 *most = f64::max(*most, term.hessian.column(X + i).amax());
+            }
+        }
+        for (nodes, hessian) in self.pair_hessians() {
+            let [first, second] = nodes;
+            for i in X..N {
+                let by_first = hessian
+                    .first
+                    .column(i)
+                    .amax()
+                    .max(hessian.mixed.row(i).amax());
+                let by_second = hessian
+                    .second
+                    .column(i)
+                    .amax()
+                    .max(hessian.mixed.column(i).amax());
+                most[first][i - X] = by_first.max(most[first][i - X]);
+                most[second][i - X] = by_second.max(most[second][i - X]);
             }
         }
         let is_cost_free = |most: f64| most <= NOTHING * largest;

@@ -8,14 +8,19 @@
 //! ```
 //!
 //! H is the second derivative of the Lagrangian, J and S the gradients of equalities and slacks, s the slacks and ν their
-//! multipliers. Inequalities of stages and nodes are folded into H; inequalities between pairs are rows of the border.
+//! multipliers. Inequalities of stages and nodes are folded into H; inequalities between pairs are rows of the border, and so
+//! are the second derivatives of constraints between pairs, which the chain has no place for.
+
+#[cfg(test)]
+mod tests;
 
 use super::TooConcave;
 use super::border::{Border, Row};
 use super::chain::{Diagonal, Factor, NodeMatrix, NodeVector};
 use crate::larger;
-use crate::layout::Layout;
-use crate::program::{Linearisation, Multipliers, Program, Values, product};
+use crate::layout::{Block, Layout};
+use crate::linearisation::{Linearisation, product};
+use crate::program::{Multipliers, Program, Values};
 use nalgebra::SMatrix;
 use std::ops::Range;
 
@@ -35,9 +40,9 @@ pub(crate) struct Kkt<const X: usize, const U: usize, const N: usize> {
     pub(crate) stiffness: Vec<f64>,
     diagonal: Diagonal<X, U, N>,
     factor: Factor<U, N>,
-    /// Equalities between pairs, then inequalities between pairs.
+    /// Equalities between pairs, inequalities between pairs, then the squares in the second derivatives of both.
     border: Border<N>,
-    /// All equalities as rows of a border, then the inequalities between pairs, where they are so.
+    /// All equalities as rows of a border, then the other rows of pairs, where they are so.
     exact: Option<Border<N>>,
     node_weights: Vec<f64>,
     damping: f64,
@@ -45,8 +50,10 @@ pub(crate) struct Kkt<const X: usize, const U: usize, const N: usize> {
     /// Pull of the springs: zero but at the nodes of equalities.
     pulls: Vec<NodeVector<N>>,
     correction: Vec<NodeVector<N>>,
-    /// Forces that the inequalities between pairs take along the step.
+    /// Multipliers along the step of the rows of pairs that are not equalities.
     pair_forces: Vec<f64>,
+    /// Changes, with the sign changed, that the inequalities between pairs are to make beside those by their forces.
+    pub(crate) pair_targets: Vec<f64>,
     rates: Vec<f64>,
     /// Step of the unknowns.
     pub(crate) step: Vec<NodeVector<N>>,
@@ -59,13 +66,14 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         let zeros = vec![NodeVector::zeros(); layout.nodes()];
         let linear = Linearisation::new(layout);
         let layout = linear.layout();
-        let equalities = layout.equalities_between().iter();
-        let inequalities = layout.inequalities_between().iter();
-        let pairs = equalities.chain(inequalities);
-        let rows = pairs
-            .flat_map(|block| vec![Row::between(block.at, [NodeVector::zeros(); 2]); block.rows]);
+        let rows = |blocks: &[Block<[usize; 2]>], is_equality: bool| {
+            let rows = |block: &Block<_>| vec![Row::between(block.at, is_equality); block.rows];
+            blocks.iter().flat_map(rows).collect::<Vec<_>>()
+        };
+        let mut pairs = rows(layout.equalities_between(), true);
+        pairs.extend(rows(layout.inequalities_between(), false));
         Self {
-            border: Border::new(rows.collect(), layout.nodes()),
+            border: Border::new(pairs, layout.nodes()),
             exact: None,
             stiffness: vec![0.0; layout.inequalities()],
             diagonal: linear.diagonal.clone(),
@@ -76,6 +84,7 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
             pulls: zeros.clone(),
             correction: zeros.clone(),
             pair_forces: vec![0.0; linear.pair_slacks.len()],
+            pair_targets: vec![0.0; linear.pair_slacks.len()],
             rates: vec![0.0; layout.equalities()],
             multiplier_step: vec![0.0; layout.equalities()],
             step: zeros,
@@ -165,7 +174,7 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         for (row, by) in equalities.iter_mut().zip(&linear.equalities_between) {
             row.by = *by;
         }
-        let first = linear.layout().inequalities() - linear.pair_slacks.len();
+        let first = linear.layout().first_pair_row();
         let slacks = linear.pair_slacks.iter().zip(&self.stiffness[first..]);
         for (row, (by, stiffness)) in inequalities.iter_mut().zip(slacks) {
             // A row that is left out takes no part: it is zero.
@@ -176,6 +185,16 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
                 [NodeVector::zeros(); 2]
             };
             row.compliance = if counted { stiffness.recip() } else { 0.0 };
+        }
+        let constraints = linear.equalities_between.len() + linear.pair_slacks.len();
+        if constraints > 0 {
+            let squares = linear.pair_hessians().flat_map(|(nodes, hessian)| {
+                let squares = hessian.squares().into_iter();
+                squares.map(move |square| Row::square(nodes, square))
+            });
+            self.border.replace_beyond(constraints, squares);
+            let multipliers = self.border.rows.len() - linear.equalities_between.len();
+            self.pair_forces.resize(multipliers, 0.0);
         }
     }
 
@@ -209,7 +228,7 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         let most = self.border.rows.len();
         let concave = chain.factorise(&self.diagonal, damping, &self.node_weights, most, factor)?;
         let held = self.border.factorise(chain, factor, COMPLIANCE)?;
-        match concave == held {
+        match concave + self.border.concave_rows() == held {
             true => Ok(()),
             false => Err(TooConcave),
         }
@@ -222,7 +241,7 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
     ///
     /// Errors: [`TooConcave`] where the chain has a direction of no curvature.
     pub(crate) fn factorise_exactly(&mut self) -> Result<usize, TooConcave> {
-        let concave = self.factorise_chain()?;
+        let concave = self.factorise_chain()? + self.border.concave_rows();
         let mut border = self.all_rows();
         let held = border.factorise(&self.linear.chain, &mut self.factor, 0.0)?;
         self.exact = Some(border);
@@ -236,7 +255,7 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
     ///
     /// Errors: [`TooConcave`] where there is a direction of no curvature.
     pub(crate) fn count_negative(&mut self) -> Result<usize, TooConcave> {
-        let concave = self.factorise_chain()?;
+        let concave = self.factorise_chain()? + self.border.concave_rows();
         if concave == 0 {
             return Ok(0);
         }
@@ -250,7 +269,7 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         chain.factorise(&self.diagonal, 0.0, &self.node_weights, usize::MAX, factor)
     }
 
-    /// A border of all equalities and of the inequalities between pairs.
+    /// A border of all equalities and of the other rows of pairs.
     fn all_rows(&self) -> Border<N> {
         let mut by = self.linear.equalities_at.iter();
         let blocks = self.layout().equalities_at().iter();
@@ -384,6 +403,9 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         for (missing, target) in equalities.iter_mut().zip(targets) {
             *missing += target;
         }
+        for (missing, target) in inequalities.iter_mut().zip(&self.pair_targets) {
+            *missing += target;
+        }
         let rows = &self.border.rows[targets.len()..];
         for ((missing, row), force) in inequalities.iter_mut().zip(rows).zip(&self.pair_forces) {
             *missing -= row.compliance * force;
@@ -412,14 +434,13 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         self.linear
             .chain
             .solve(&mut self.factor, &self.right, &mut self.step);
-        let all: Vec<f64> = targets
-            .iter()
-            .copied()
-            .chain(self.pair_forces.iter().map(|_| 0.0))
-            .collect();
+        let mut all = targets.to_vec();
+        all.extend(&self.pair_targets);
+        all.resize(border.rows.len(), 0.0);
         let forces = border.correct(&all, &mut self.step);
-        self.multiplier_step
-            .copy_from_slice(&forces.as_slice()[..targets.len()]);
+        let (equalities, others) = forces.as_slice().split_at(targets.len());
+        self.multiplier_step.copy_from_slice(equalities);
+        self.pair_forces.copy_from_slice(others);
         self.take_missing_at_nodes(targets_at);
     }
 
@@ -432,6 +453,11 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         for (gradient, pull) in gradient.iter_mut().zip(&self.right) {
             *gradient -= pull;
         }
+    }
+
+    /// Multipliers along the step of the inequalities between pairs: stiffness times the change of their slacks.
+    pub(crate) fn pair_forces(&self) -> &[f64] {
+        &self.pair_forces[..self.linear.pair_slacks.len()]
     }
 
     /// Change of every slack along the step, to first order.

@@ -6,6 +6,7 @@ pub(crate) mod chain;
 mod inertia;
 mod kkt;
 pub(crate) mod modes;
+mod pair_matrix;
 mod rank;
 mod response;
 mod small;
@@ -14,6 +15,7 @@ pub use inertia::Inertia;
 pub(crate) use kkt::Kkt;
 pub(crate) use modes::lowest_modes_of;
 pub use modes::{Mode, lowest_modes, moved};
+pub use pair_matrix::{PairMatrix, StageMatrix};
 pub use rank::redundant_equalities;
 pub use response::{Direction, Response, Singular};
 

@@ -4,7 +4,8 @@ use super::TooConcave;
 use super::chain::NodeVector;
 use super::kkt::Kkt;
 use crate::layout::Layout;
-use crate::program::{Linearisation, Program, Stationary, Values};
+use crate::linearisation::Linearisation;
+use crate::program::{Program, Stationary, Values};
 use crate::{Residuals, larger, largest, largest_entry};
 use nalgebra::SMatrix;
 
@@ -278,8 +279,10 @@ impl<const X: usize, const U: usize, const N: usize> Response<X, U, N> {
     /// The solution, improved until that is not worth while; the share of the last improvement, and what is still missed.
     fn improve(&mut self, right: &Direction<N>) -> (Direction<N>, f64, Direction<N>) {
         let mut found = self.zero();
+        let first_pair_row = self.layout().first_pair_row();
         let stiffness = self.kkt.stiffness.iter().zip(&right.inequalities);
-        for (found, (stiffness, right)) in found.inequalities.iter_mut().zip(stiffness) {
+        let rows = found.inequalities[..first_pair_row].iter_mut();
+        for (found, (stiffness, right)) in rows.zip(stiffness) {
             *found = stiffness * right;
         }
         let mut missed = self.missed(right, &found);
@@ -288,6 +291,8 @@ impl<const X: usize, const U: usize, const N: usize> Response<X, U, N> {
         let least = NOTHING * least;
         let size = |vectors: &[_]| largest_entry(vectors).max(least).max(f64::MIN_POSITIVE);
         for _ in 0..=REFINEMENTS {
+            let of_pairs = &missed.inequalities[first_pair_row..];
+            self.kkt.pair_targets.copy_from_slice(of_pairs);
             self.kkt.find_step(&missed.nodes, &missed.equalities);
             self.add_step(&mut found);
             missed = self.missed(right, &found);
@@ -313,12 +318,18 @@ impl<const X: usize, const U: usize, const N: usize> Response<X, U, N> {
         }
         let rates = self.slack_rates(&self.kkt.step);
         let rows = rates.iter().zip(&self.kkt.stiffness);
-        for (row, (rate, stiffness)) in to.inequalities.iter_mut().zip(rows) {
+        let (others, pairs) = to.inequalities.split_at_mut(self.layout().first_pair_row());
+        for (row, (rate, stiffness)) in others.iter_mut().zip(rows) {
             *row += stiffness * rate;
+        }
+        // These are unknowns of the border, not differences that drown in rounding.
+        for (row, force) in pairs.iter_mut().zip(self.kkt.pair_forces()) {
+            *row += force;
         }
     }
 
-    /// Left-hand side of the first two rows plus the right-hand side: nothing at the solution.
+    /// Left-hand side plus right-hand side, zero at the solution: of stationarity, of the equalities and of the inequalities
+    /// between pairs. The other inequalities are eliminated.
     fn missed(&self, right: &Direction<N>, at: &Direction<N>) -> Direction<N> {
         let linear = self.linear();
         let mut missed = right.clone();
@@ -332,6 +343,18 @@ impl<const X: usize, const U: usize, const N: usize> Response<X, U, N> {
         linear.equality_rates(&at.nodes, &mut rates);
         for (missed, rate) in missed.equalities.iter_mut().zip(rates) {
             *missed += rate;
+        }
+        let first = self.layout().first_pair_row();
+        if first < missed.inequalities.len() {
+            let rates = self.slack_rates(&at.nodes);
+            let rows = missed.inequalities.iter_mut().zip(&at.inequalities);
+            let rows = rows.zip(rates).zip(&self.kkt.stiffness).skip(first);
+            for (((missed, multiplier), rate), stiffness) in rows {
+                *missed = match *stiffness {
+                    0.0 => 0.0,
+                    stiffness => *missed + rate - multiplier / stiffness,
+                };
+            }
         }
         missed
     }

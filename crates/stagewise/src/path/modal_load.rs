@@ -7,7 +7,8 @@ use super::family::Family;
 use crate::layout::Layout;
 use crate::linear::chain::NodeVector;
 use crate::linear::{Mode, Response};
-use crate::program::{Distance, Linearisation, Multipliers, Program, Scales, Stationary, Values};
+use crate::linearisation::Linearisation;
+use crate::program::{Distance, Multipliers, Program, Scales, Stationary, Values};
 use nalgebra::SMatrix;
 use std::ops::ControlFlow;
 

@@ -1,8 +1,9 @@
 //! Elimination of a chain's controls, stage by stage from the last to the first.
 
 use super::columns::{Columns, add_scaled, carried, dot_states, weighted};
-use super::{Chain, Diagonal, NodeMatrix, NodeVector, Stage, StageMatrix};
+use super::{Chain, Diagonal, NodeMatrix, NodeVector, Stage};
 use crate::linear::TooConcave;
+use crate::linear::pair_matrix::StageMatrix;
 use crate::linear::small::{invert, invert_indefinite};
 use multiversion::multiversion;
 use nalgebra::{ArrayStorage, Cholesky, Const};
