@@ -1,10 +1,11 @@
-# make demo    solves example 1: the table here, out/example1.json and out/example1.png
-# make test    everything that must hold
-# make docs    the documents as a site: out/site/index.html
-# make wheel   a wheel that anyone can install, in dist; tried in an empty environment, without cargo
-# make figures draws the pictures of README.md and docs
-# make bench   measures how fast it is beside what one would use instead, and writes docs/performance.md
-# make clean   removes what these made
+# make demo     solves example 1: the table here, out/example1.json and out/example1.png
+# make test     everything that must hold
+# make test-all the same, and the tests that take long
+# make docs     the documents as a site: out/site/index.html
+# make wheel    a wheel that anyone can install, in dist; tried in an empty environment, without cargo
+# make figures  draws the pictures of README.md and docs
+# make bench    measures how fast it is beside what one would use instead, and writes docs/performance.md
+# make clean    removes what these made
 #
 # `make bench BENCH="--only cold --dry-run"` measures a part and saves nothing.
 # Needs cargo, Python 3.10 or newer and make; everything else goes into .venv.
@@ -16,6 +17,8 @@ PIP := PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python -m pip --quiet --disable-pip
 CORE := python/fishbone/_core.abi3.so
 WASM := wasm32-unknown-unknown
 SITE := out/site
+# A worker for each core, up to eight. They start with neighbours, which share what is solved once.
+PYTEST := $(BIN)/python -m pytest --quiet --numprocesses auto --maxprocesses 8 --dist worksteal
 
 # Linked by zig, a wheel of Linux runs on systems from 2014 on; any other is for systems like this one.
 HOST = $(shell rustc -vV 2>/dev/null | sed -n 's/^host: //p')
@@ -28,7 +31,7 @@ RUST_SOURCES := Cargo.toml Cargo.lock $(shell find crates scenarios -type f)
 PYTHON_SOURCES := pyproject.toml $(shell find python tests benchmarks docs -name '*.py' -o -name '*.pyi')
 TEXTS := $(shell find *.md LICENSE CITATION.cff docs scenarios tests -type f -not -name '*.pyc' 2>/dev/null)
 
-.PHONY: help demo test docs wheel figures bench clean
+.PHONY: help demo test test-all docs wheel figures bench clean
 .DELETE_ON_ERROR:
 
 help:
@@ -39,8 +42,13 @@ demo: $(CORE)
 	@$(BIN)/fishbone solve scenarios/example1.toml --out out/example1.json --figure out/example1.png
 	@echo "out/example1.json and out/example1.png written"
 
-test: $(VENV)/.rust $(VENV)/.wasm $(VENV)/.lint $(VENV)/.pytest $(SITE)/index.html
+CHECKS := $(VENV)/.rust $(VENV)/.wasm $(VENV)/.lint $(SITE)/index.html
+
+test: $(CHECKS) $(VENV)/.pytest
 	@echo "all tests pass"
+
+test-all: $(CHECKS) $(VENV)/.pytest-all
+	@echo "all tests pass, the long ones too"
 
 docs: $(SITE)/index.html
 	@echo "$< written"
@@ -133,5 +141,10 @@ $(VENV)/.lint: $(CORE) $(PYTHON_SOURCES)
 
 $(VENV)/.pytest: $(CORE) $(PYTHON_SOURCES) $(TEXTS)
 	@echo "testing the Python code"
-	@$(BIN)/python -m pytest --quiet
+	@$(PYTEST)
 	@touch $@
+
+$(VENV)/.pytest-all: $(CORE) $(PYTHON_SOURCES) $(TEXTS)
+	@echo "testing the Python code, with what takes long"
+	@$(PYTEST) -m ''
+	@touch $@ $(VENV)/.pytest
