@@ -17,8 +17,6 @@ PIP := PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python -m pip --quiet --disable-pip
 CORE := python/fishbone/_core.abi3.so
 WASM := wasm32-unknown-unknown
 SITE := out/site
-# A worker for each core, up to eight. They start with neighbours, which share what is solved once.
-PYTEST := $(BIN)/python -m pytest --quiet --numprocesses auto --maxprocesses 8 --dist worksteal
 
 # Linked by zig, a wheel of Linux runs on systems from 2014 on; any other is for systems like this one.
 HOST = $(shell rustc -vV 2>/dev/null | sed -n 's/^host: //p')
@@ -42,13 +40,11 @@ demo: $(CORE)
 	@$(BIN)/fishbone solve scenarios/example1.toml --out out/example1.json --figure out/example1.png
 	@echo "out/example1.json and out/example1.png written"
 
-CHECKS := $(VENV)/.rust $(VENV)/.wasm $(VENV)/.lint $(SITE)/index.html
-
-test: $(CHECKS) $(VENV)/.pytest
+test: $(VENV)/.rust $(VENV)/.wasm $(VENV)/.lint $(VENV)/.pytest $(SITE)/index.html
 	@echo "all tests pass"
 
-test-all: $(CHECKS) $(VENV)/.pytest-all
-	@echo "all tests pass, the long ones too"
+test-all: test $(VENV)/.pytest-full
+	@echo "and so do those that take long"
 
 docs: $(SITE)/index.html
 	@echo "$< written"
@@ -139,12 +135,14 @@ $(VENV)/.lint: $(CORE) $(PYTHON_SOURCES)
 	@$(BIN)/python -m mypy.stubtest --concise fishbone._core
 	@touch $@
 
+# A worker for each core, up to eight. Each starts with tests that stand together and share what is solved once.
 $(VENV)/.pytest: $(CORE) $(PYTHON_SOURCES) $(TEXTS)
 	@echo "testing the Python code"
-	@$(PYTEST)
+	@$(BIN)/python -m pytest --quiet --numprocesses auto --maxprocesses 8 --dist worksteal
 	@touch $@
 
-$(VENV)/.pytest-all: $(CORE) $(PYTHON_SOURCES) $(TEXTS)
-	@echo "testing the Python code, with what takes long"
-	@$(PYTEST) -m ''
-	@touch $@ $(VENV)/.pytest
+# In one process: a whole search takes all cores by itself, and is made once for all tests of it.
+$(VENV)/.pytest-full: $(CORE) $(PYTHON_SOURCES) $(TEXTS)
+	@echo "testing what takes long"
+	@$(BIN)/python -m pytest --quiet -m full
+	@touch $@

@@ -53,16 +53,19 @@ def arch() -> fb.Scenario:
 
 @pytest.fixture(
     scope="session",
-    params=[pytest.param(FEW, id="few"), pytest.param(None, id="whole", marks=pytest.mark.full)],
+    params=[
+        pytest.param(functools.partial(_search, budget=FEW), id="few"),
+        pytest.param(fb.branches, id="whole", marks=pytest.mark.full),
+    ],
 )
 def search(request: pytest.FixtureRequest) -> Callable[..., list[fb.Equilibrium]]:
-    """`fb.branches`, with a small budget and as it is: what needs it is tested with both."""
-    return functools.partial(_search, budget=request.param)
+    """A search with a small budget, and `fb.branches`: what needs one is tested with both."""
+    return request.param
 
 
 @pytest.fixture(scope="session")
 def arches(arch: fb.Scenario, search: Callable[..., list[fb.Equilibrium]]) -> list[fb.Equilibrium]:
-    """Its equilibria: a search of some seconds, or of half a minute."""
+    """Its equilibria: a search of some seconds, and one of half a minute."""
     return search(arch)
 
 
