@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from fishbone import _core
 from fishbone.equilibrium import Equilibrium, core_of
@@ -11,6 +11,17 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from fishbone.scenario import Scenario
+
+
+class _Budget(NamedTuple):
+    """How much is searched, where that is to be less than usual: a search of seconds, which misses some."""
+
+    sums: int
+    """Sums of waves among the starts, a number."""
+    perturbed: int
+    """Minima that are perturbed, the largest number."""
+    continued: int
+    """Equilibria that are continued in modal loads, the largest number."""
 
 
 def branches(scenario: Scenario, *, progress: Callable[[int, int], object] | None = None) -> list[Equilibrium]:
@@ -29,5 +40,12 @@ def branches(scenario: Scenario, *, progress: Callable[[int, int], object] | Non
 
     Errors: `InvalidArgument` where `scenario` is none; whatever `progress` raises.
     """
-    found = _core.branches(core_of(scenario), progress)
+    return _search(scenario, None, progress)
+
+
+def _search(
+    scenario: Scenario, budget: _Budget | None, progress: Callable[[int, int], object] | None = None
+) -> list[Equilibrium]:
+    """What `branches` finds with a budget: all it can without one."""
+    found = _core.branches(core_of(scenario), progress, budget)
     return [Equilibrium(scenario, inner) for inner in found]
