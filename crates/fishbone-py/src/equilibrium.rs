@@ -5,7 +5,6 @@ use crate::errors::raised;
 use crate::scenario::Scenario;
 use crate::sensitivity::Sensitivity;
 use crate::signals::Signals;
-use crate::tracker::Tracker;
 use fishbone::analysis::margin::MarginSettings;
 use fishbone::board::curve::Curve;
 use fishbone::equilibrium;
@@ -437,13 +436,6 @@ impl Equilibrium {
             )
         };
         Ok(modes.into_iter().map(mode).collect())
-    }
-
-    /// Follows it while a support moves.
-    ///
-    /// Errors: `NoTracker`.
-    fn tracker(&self, py: Python<'_>, support: usize) -> PyResult<Tracker> {
-        Tracker::new(py, &self.solved, support)
     }
 
     /// Its first-order conditions, factorised with the GIL released.

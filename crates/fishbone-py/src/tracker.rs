@@ -17,17 +17,6 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 pub(crate) struct Tracker(Mutex<core::Tracker>);
 
 impl Tracker {
-    /// Errors: `NoTracker`.
-    pub(crate) fn new(
-        py: Python<'_>,
-        equilibrium: &fishbone::equilibrium::Equilibrium,
-        support: usize,
-    ) -> PyResult<Self> {
-        core::Tracker::new(equilibrium, support)
-            .map(|tracker| Self(Mutex::new(tracker)))
-            .map_err(|error| raised(py, &error))
-    }
-
     fn lock(&self) -> MutexGuard<'_, core::Tracker> {
         // An update that has panicked is not gone on with.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
@@ -36,6 +25,16 @@ impl Tracker {
 
 #[pymethods]
 impl Tracker {
+    /// Starts at an equilibrium.
+    ///
+    /// Errors: `NoTracker`.
+    #[new]
+    fn new(py: Python<'_>, equilibrium: &Equilibrium, support: usize) -> PyResult<Self> {
+        core::Tracker::new(equilibrium.core(), support)
+            .map(|tracker| Self(Mutex::new(tracker)))
+            .map_err(|error| raised(py, &error))
+    }
+
     /// (status, snapped, energy, iterations, largest residual).
     ///
     /// Errors: whatever a signal handler raises, `KeyboardInterrupt` first of all.

@@ -6,6 +6,7 @@
 mod active_set;
 mod assembly;
 pub mod belt;
+mod constraints;
 mod edges;
 mod mesh;
 pub mod program;
