@@ -116,7 +116,7 @@ impl Layout {
     }
 
     /// Share of every stage in the whole.
-    pub fn stage_weights(&self) -> &[f64] {
+    pub(crate) fn stage_weights(&self) -> &[f64] {
         &self.stage_weights
     }
 
@@ -187,12 +187,12 @@ impl Layout {
     }
 
     /// Weight of every inequality in the barrier.
-    pub fn row_weights(&self) -> &[f64] {
+    pub(crate) fn row_weights(&self) -> &[f64] {
         &self.row_weights
     }
 
     /// Rows of every block of equalities, in the order of their values.
-    pub fn equality_blocks(&self) -> impl Iterator<Item = Range<usize>> {
+    pub(crate) fn equality_blocks(&self) -> impl Iterator<Item = Range<usize>> {
         let at = self.equalities_at.iter().map(|block| block.rows);
         let between = self.equalities_between.iter().map(|block| block.rows);
         ranges(at.chain(between))

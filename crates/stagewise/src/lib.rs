@@ -21,12 +21,10 @@ mod program;
 
 pub use interior_point::{Outcome, Residuals, Settings, Solution, assess, minimise};
 pub use layout::{Block, Layout};
-pub use linear::chain::{
-    ByControls, Chain, Diagonal, Factor, NodeMatrix, NodeTerm, NodeVector, Stage,
-};
+pub use linear::chain::{ByControls, Chain, Diagonal, NodeMatrix, NodeVector, Stage};
 pub use linear::{
-    Direction, Inertia, Mode, PairMatrix, Response, Singular, StageMatrix, TooConcave,
-    lowest_modes, moved, redundant_equalities,
+    Direction, Inertia, Mode, PairMatrix, Response, Singular, StageMatrix, lowest_modes, moved,
+    redundant_equalities,
 };
 pub use linearisation::Linearisation;
 pub use path::{

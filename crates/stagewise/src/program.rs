@@ -61,7 +61,7 @@ impl Default for Scales {
 
 impl Scales {
     /// Unit of the eigenvalues of the second variation: objective over squared distance.
-    pub fn eigenvalue(&self) -> f64 {
+    pub(crate) fn eigenvalue(&self) -> f64 {
         self.objective / (self.distance * self.distance)
     }
 }

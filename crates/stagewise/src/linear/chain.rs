@@ -15,7 +15,7 @@ mod solve;
 #[cfg(test)]
 mod tests;
 
-pub use factor::Factor;
+pub(crate) use factor::Factor;
 
 use super::pair_matrix::StageMatrix;
 use columns::{add_scaled, dot_states};
@@ -82,11 +82,11 @@ impl<const U: usize, const N: usize> Stage<U, N> {
 
 /// What a node adds of its own: second derivative by its unknowns.
 #[derive(Debug, Clone, Copy)]
-pub struct NodeTerm<const N: usize> {
+pub(crate) struct NodeTerm<const N: usize> {
     /// Which node.
-    pub node: usize,
+    pub(crate) node: usize,
     /// Second derivative.
-    pub hessian: NodeMatrix<N>,
+    pub(crate) hessian: NodeMatrix<N>,
 }
 
 /// The part of the second derivatives that does not change with the barrier.
@@ -106,7 +106,7 @@ pub struct Diagonal<const X: usize, const U: usize, const N: usize> {
     /// Second derivative by the state of every node; empty where there is none.
     pub states: Vec<SMatrix<f64, X, X>>,
     /// Terms at single nodes, by rising node.
-    pub nodes: Vec<NodeTerm<N>>,
+    pub(crate) nodes: Vec<NodeTerm<N>>,
 }
 
 impl<const X: usize, const U: usize, const N: usize> Diagonal<X, U, N> {
@@ -174,7 +174,7 @@ impl<const U: usize, const N: usize> Chain<U, N> {
     }
 
     /// Second derivative of the objective along two steps whose states have been carried along.
-    pub fn second_derivative<const X: usize>(
+    pub(crate) fn second_derivative<const X: usize>(
         &self,
         diagonal: &Diagonal<X, U, N>,
         a: &[NodeVector<N>],

@@ -21,4 +21,4 @@ pub use response::{Direction, Response, Singular};
 
 /// The objective has more directions of negative curvature than allowed, or one of none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct TooConcave;
+pub(crate) struct TooConcave;

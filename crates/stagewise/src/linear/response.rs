@@ -378,7 +378,7 @@ impl<const N: usize> Direction<N> {
     }
 
     /// Multiplies it by a factor.
-    pub fn scale(&mut self, factor: f64) {
+    pub(crate) fn scale(&mut self, factor: f64) {
         self.nodes.iter_mut().for_each(|node| *node *= factor);
         let rows = self.equalities.iter_mut().chain(&mut self.inequalities);
         rows.for_each(|row| *row *= factor);

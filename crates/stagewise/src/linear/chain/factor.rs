@@ -26,7 +26,7 @@ pub(super) enum First<const N: usize> {
 
 /// A factorised chain, and room for the forces of one right-hand side.
 #[derive(Debug, Clone)]
-pub struct Factor<const U: usize, const N: usize> {
+pub(crate) struct Factor<const U: usize, const N: usize> {
     pub(super) eliminations: Vec<Elimination<U, N>>,
     pub(super) first: First<N>,
     pub(super) forces: Vec<[f64; U]>,
@@ -34,7 +34,7 @@ pub struct Factor<const U: usize, const N: usize> {
 
 impl<const U: usize, const N: usize> Factor<U, N> {
     /// Room for a chain of so many stages.
-    pub fn new(stages: usize) -> Self {
+    pub(crate) fn new(stages: usize) -> Self {
         let nothing = Elimination {
             inverse: [[0.0; U]; U],
             gain: [[0.0; N]; U],
@@ -70,7 +70,7 @@ impl<const U: usize, const N: usize> Chain<U, N> {
     /// control times the node's weight. Gives the number of concave directions, of `most` that are allowed.
     ///
     /// Errors: [`TooConcave`] where there are more, or a direction of no curvature.
-    pub fn factorise<const X: usize>(
+    pub(crate) fn factorise<const X: usize>(
         &self,
         diagonal: &Diagonal<X, U, N>,
         damping: f64,

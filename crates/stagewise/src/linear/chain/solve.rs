@@ -8,7 +8,7 @@ impl<const U: usize, const N: usize> Chain<U, N> {
     /// The step of least cost under a gradient by the unknowns of every node.
     ///
     /// Shapes: `gradient` and `step` have one entry a node.
-    pub fn solve(
+    pub(crate) fn solve(
         &self,
         factor: &mut Factor<U, N>,
         gradient: &[NodeVector<N>],
