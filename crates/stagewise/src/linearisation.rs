@@ -28,12 +28,12 @@ pub struct Linearisation<const X: usize, const U: usize, const N: usize> {
     /// of every block of inequalities.
     pair_hessians: Vec<PairMatrix<N>>,
     layout: Layout,
-    /// Places among the terms at single nodes: of every block of equalities, then of every block of inequalities.
+    /// Indices among the terms at single nodes: of every block of equalities, then of every block of inequalities.
     terms: Vec<usize>,
 }
 
 impl<const X: usize, const U: usize, const N: usize> Linearisation<X, U, N> {
-    /// Room for the derivatives of a programme of a layout.
+    /// Zero derivatives of a programme of a layout.
     pub fn new(layout: Layout) -> Self {
         const { assert!(X + U == N) }
         let stages = layout.stages();
@@ -78,7 +78,7 @@ impl<const X: usize, const U: usize, const N: usize> Linearisation<X, U, N> {
         }
     }
 
-    /// The layout that it is of.
+    /// Layout of the programme.
     pub fn layout(&self) -> &Layout {
         &self.layout
     }
@@ -122,7 +122,7 @@ impl<const X: usize, const U: usize, const N: usize> Linearisation<X, U, N> {
         self.chain.second_derivative(&self.diagonal, a, b) + pairs.sum::<f64>()
     }
 
-    /// Place of a block among the terms at single nodes; blocks of inequalities follow those of equalities.
+    /// Index of a block among the terms at single nodes; blocks of inequalities follow blocks of equalities.
     pub(crate) fn term(&self, block: usize) -> usize {
         self.terms[block]
     }
@@ -153,8 +153,8 @@ impl<const X: usize, const U: usize, const N: usize> Linearisation<X, U, N> {
         }
     }
 
-    /// Turns a gradient by states and controls of all nodes into that by the unknowns: states beyond the first, which
-    /// inequalities of nodes and pairs have, are carried back, and controls that follow others are folded onto these.
+    /// Turns a gradient by states and controls of all nodes into a gradient by the unknowns. Entries by states beyond the
+    /// first are carried back; only inequalities of nodes and pairs have such entries. Entries by tied controls are folded.
     pub(crate) fn gather_gradient(&self, gradient: &mut [NodeVector<N>]) {
         if self.layout.inequalities() > self.layout.inequalities_at_stages() {
             self.chain.carry_back(gradient);
@@ -309,7 +309,7 @@ impl<const X: usize, const U: usize, const N: usize> Linearisation<X, U, N> {
         }
     }
 
-    /// Keeps of the chain how it carries states and controls on, and nothing of what that costs.
+    /// Sets all second derivatives to zero, and keeps the growth of states and the ties of controls.
     pub(crate) fn forget_second_derivatives(&mut self) {
         for stage in &mut self.chain.stages {
             stage.state_first.fill(0.0);

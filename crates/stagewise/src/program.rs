@@ -1,11 +1,11 @@
-//! What the solver asks of a programme, and what it answers with.
+//! The interface between a programme and the solver: values, derivatives, multipliers, points.
 
 use crate::layout::Layout;
 use crate::linear::chain::NodeVector;
 use crate::linearisation::Linearisation;
 use nalgebra::SMatrix;
 
-/// What a programme is worth at a point.
+/// Objective and constraints of a programme at a point.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Values {
     /// Objective.
@@ -19,14 +19,14 @@ pub struct Values {
 /// Multipliers of a programme's constraints, in the order of the [`Layout`].
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Multipliers {
-    /// Of the equalities.
+    /// Multipliers of the equalities.
     pub equalities: Vec<f64>,
-    /// Of the inequalities, not negative.
+    /// Multipliers of the inequalities, not negative.
     pub inequalities: Vec<f64>,
 }
 
 impl Multipliers {
-    /// Zero for every constraint.
+    /// A multiplier of zero for every constraint.
     pub fn zero(layout: &Layout) -> Self {
         Self {
             equalities: vec![0.0; layout.equalities()],
@@ -34,14 +34,14 @@ impl Multipliers {
         }
     }
 
-    /// Takes over others of the same size, without allocating.
+    /// Copies multipliers of the same layout, without allocating.
     pub(crate) fn copy_from(&mut self, other: &Self) {
         self.equalities.copy_from_slice(&other.equalities);
         self.inequalities.copy_from_slice(&other.inequalities);
     }
 }
 
-/// Units in which the numbers of a programme are of order one. What the solver calls small or large is so in these.
+/// Units in which the numbers of a programme are of order one. The solver's tolerances are in these units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scales {
     /// Unit of the objective.
@@ -61,7 +61,7 @@ impl Default for Scales {
 
 impl Scales {
     /// Unit of the eigenvalues of the second variation: objective over squared distance.
-    pub fn eigenvalue(&self) -> f64 {
+    pub(crate) fn eigenvalue(&self) -> f64 {
         self.objective / (self.distance * self.distance)
     }
 }
@@ -74,7 +74,7 @@ pub trait Program<const X: usize, const U: usize, const N: usize> {
     /// A point of the search space, which need not be a vector space.
     type Point: Clone;
 
-    /// Number of stages, and what every constraint touches. It stays the same while a programme is being solved.
+    /// Number of stages, and the nodes of every constraint. The layout stays the same while a programme is being solved.
     fn layout(&self) -> Layout;
 
     /// Units in which the numbers of the programme are of order one.
@@ -82,23 +82,22 @@ pub trait Program<const X: usize, const U: usize, const N: usize> {
         Scales::default()
     }
 
-    /// Carries the states of a point along the chain and evaluates it; false outside the domain. Where inequalities alone
-    /// are broken it still gives slacks and equalities.
+    /// Carries the states of a point along the chain and evaluates the programme there; false outside the domain. Slacks and
+    /// equalities are given also where inequalities alone are violated.
     fn evaluate(&self, point: &mut Self::Point, values: &mut Values) -> bool;
 
     /// Gradients of the equalities at nodes.
     fn equality_gradients(&self, point: &Self::Point, into: &mut [NodeVector<N>]);
 
-    /// Derivatives at a point that has been evaluated, of the objective plus multipliers times equalities; the second ones
-    /// with multipliers times slacks of the inequalities taken off. First derivatives of the slacks stand by themselves: the
-    /// solver adds them to the gradient.
-    ///
-    /// The gradient is by the unknowns: states beyond the first have none.
+    /// Derivatives at a point that has been evaluated. The gradient is that of the objective plus multipliers times
+    /// equalities, by the unknowns: its entries by states beyond the first are zero. Gradients of slacks are given apart, and
+    /// the solver adds them to the gradient. Second derivatives are those of the objective plus multipliers times equalities
+    /// minus multipliers times slacks.
     ///
     /// Second derivatives of constraints between pairs belong into [`Linearisation::equality_hessian_between`] and
     /// [`Linearisation::inequality_hessian_between`]; the parts by the states of a single node may be in the [`Diagonal`]
-    /// instead. Where a part is missing, [`minimise`] arrives at the same points, whose first-order conditions are exact, but
-    /// converges linearly; [`Inertia`], [`lowest_modes`], [`Response`] and [`Continuation`] are wrong by that part.
+    /// instead. Where a part is missing, [`minimise`] converges to the same points, as their first-order conditions are
+    /// exact, but linearly; [`Inertia`], [`lowest_modes`], [`Response`] and [`Continuation`] are wrong by the missing part.
     ///
     /// [`Diagonal`]: crate::Diagonal
     /// [`minimise`]: crate::minimise
@@ -113,7 +112,7 @@ pub trait Program<const X: usize, const U: usize, const N: usize> {
         into: &mut Linearisation<X, U, N>,
     );
 
-    /// Moves the unknowns of a point along a step; the states still have to be carried on.
+    /// Moves the unknowns of a point along a step; the next evaluation carries the states along.
     fn retract(
         &self,
         point: &Self::Point,
@@ -122,8 +121,8 @@ pub trait Program<const X: usize, const U: usize, const N: usize> {
         into: &mut Self::Point,
     );
 
-    /// The square of how far a change of its state moves each node, with its share in the whole: by this the eigenvalues of
-    /// the second variation are measured.
+    /// The metric of every node: the squared length of a change of its state, times the node's share in the whole.
+    /// Eigenvalues of the second variation are relative to this metric.
     fn metric(&self, point: &Self::Point) -> Vec<SMatrix<f64, X, X>>;
 }
 
@@ -170,16 +169,16 @@ impl<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> Progra
     }
 }
 
-/// A point that can be kept and compared.
+/// Points that can be copied and compared.
 pub trait Distance: Clone {
-    /// Takes over another of the same size, without allocating.
+    /// Copies a point of the same size, without allocating.
     fn copy_from(&mut self, other: &Self);
 
-    /// How far apart two are, in the unit of [`Scales::distance`].
+    /// Distance of two points, in the unit of [`Scales::distance`].
     fn distance(&self, other: &Self) -> f64;
 }
 
-/// A point where the first-order conditions hold, or are meant to, with the multipliers that they take.
+/// A stationary point, or an approximation of one, with the multipliers of its first-order conditions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stationary<P> {
     /// The point.

@@ -7,7 +7,8 @@ use common::solved;
 use common::transcribed::{Number, Problem, Trajectory, Transcribed};
 use stagewise::Layout;
 
-/// A pendulum hangs from a cart and is swung up within a time of 2, while the cart moves by 1; the square of the force is least.
+/// A pendulum hangs from a cart and is swung up within a time of 2, while the cart moves by 1; the square of the force is
+/// least.
 ///
 /// Sizes are those of M. Kelly, "An introduction to trajectory optimization" (2017), Appendix E. The force is linear between
 /// nodes; one step of the classical Runge-Kutta method leads through a stage.

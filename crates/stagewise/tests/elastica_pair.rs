@@ -20,19 +20,19 @@ struct Elastica {
     /// Place and angle of the last node, as far as they are held.
     last: [Option<f64>; 3],
     pair: Pair,
-    /// A node, and what its x must not exceed.
+    /// A node, and the upper bound of its x.
     wall: Option<(usize, f64)>,
     /// Whether the solver is given the second derivatives of the distance.
     gives_pair_hessians: bool,
 }
 
-/// What ties two nodes.
+/// The constraint between two nodes.
 #[derive(Debug, Clone, PartialEq)]
 enum Pair {
     None,
-    /// They are at least so far apart.
+    /// Their distance is at least a length.
     Apart([usize; 2], f64),
-    /// They are just so far apart.
+    /// Their distance is a length.
     Rigid([usize; 2], f64),
     /// The last node is where the first is, turned by an angle.
     Closed(f64),
@@ -216,7 +216,7 @@ fn test_symmetric_contact_is_that_of_half_a_rod_against_a_wall() {
         Pair::Apart([2, 14], least),
     );
     let found = solved(&whole.program(), whole.buckled(6.0));
-    // From the start to the middle, where it slides along the line of symmetry.
+    // From the start to the middle, which slides along the line of symmetry.
     let half = Elastica {
         length: 0.5,
         wall: Some((2, 0.1 - 0.5 * least)),

@@ -8,13 +8,13 @@ use common::{root, solved};
 use nalgebra::SVector;
 use stagewise::{Layout, Solution};
 
-/// What joints must not enter.
+/// The obstacle that joints must not enter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Obstacle {
     Nothing,
-    /// They stay above a height.
+    /// Joints stay above a height.
     Floor(f64),
-    /// They stay outside of a disc about a centre.
+    /// Joints stay outside of a disc, given by centre and radius.
     Disc([f64; 2], f64),
 }
 
@@ -195,7 +195,8 @@ fn test_chain_rests_on_the_floor_where_it_touches() {
     };
     let solution = solved(&chain.program(), chain.start(-1.0, 9));
     check_balance(&chain, &solution);
-    // Both sides hang free down to a joint on the floor; between these the links lie flat. Which joint it is shows by its push.
+    // Both sides hang free down to a joint on the floor; between these the links lie flat. Which joint it is shows by its
+    // push.
     let (link, weight) = (chain.link(), chain.weight());
     let hanging = |hung: usize| {
         let angles =
@@ -256,7 +257,7 @@ fn test_chain_over_a_disc_is_pushed_square_to_it() {
     let touching = pushes.iter().filter(|push| **push > 1e-4).count();
     assert!(touching >= 3, "{pushes:?}");
     check_linear_algebra(&chain.program(), &solution.at);
-    // Less a radius, less a push: the energy grows by as much as the pushes sum up to.
+    // The derivative of the energy by the radius is the sum of the contact forces.
     let energy = |radius: f64| {
         let other = Hanging {
             obstacle: Obstacle::Disc([0.0, -0.1], radius),

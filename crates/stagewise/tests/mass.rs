@@ -150,12 +150,12 @@ fn test_limited_speed_is_held_between_two_parabolas() {
         for (k, x) in solution.at.point.x.iter().enumerate() {
             assert!((x[1] - on_the_way(k)).abs() < 1e-3);
         }
-        // What a limit is worth: its multipliers sum up to minus the slope of the cost by it.
+        // The sum of the limit's multipliers is minus the derivative of the cost by the limit.
         let slope = 4.0 / 3.0 * (2.0 * most / rise - 1.5 / rise.powi(2));
         let sum: f64 = solution.at.multipliers.inequalities.iter().sum();
         assert!((sum + slope).abs() < 1e-5);
         (solution.values.objective - cost).abs()
     });
-    // The best force is none where the limit holds, and linear before and after: the nodes are where it has its corners.
+    // The optimal force is zero where the limit holds, and linear before and after: its corners are at nodes.
     assert!(errors.iter().all(|error| *error < 1e-7), "{errors:?}");
 }

@@ -15,7 +15,7 @@ mod solve;
 #[cfg(test)]
 mod tests;
 
-pub use factor::Factor;
+pub(crate) use factor::Factor;
 
 use super::pair_matrix::StageMatrix;
 use columns::{add_scaled, dot_states};
@@ -28,7 +28,7 @@ pub type NodeMatrix<const N: usize> = SMatrix<f64, N, N>;
 /// One column for every control, by the unknowns of a node.
 pub type ByControls<const U: usize, const N: usize> = SMatrix<f64, N, U>;
 
-/// One stage: what it adds to the state, and how that bends the objective.
+/// One stage: the growth of the state, and the second derivatives that mix state and controls.
 #[derive(Debug, Clone, Copy)]
 pub struct Stage<const U: usize, const N: usize> {
     /// B₀, growth of the state by the controls at the stage's first node; its last `U` rows are zero.
@@ -41,7 +41,7 @@ pub struct Stage<const U: usize, const N: usize> {
     pub state_second: ByControls<U, N>,
     /// How the second controls follow the first, one by one: `control⁺ = tie · control` plus a free part.
     pub tie: [f64; U],
-    /// Which of the second controls have a free part; without a tie either, a control is locked.
+    /// Which of the second controls have a free part. A control with neither tie nor free part is locked.
     pub free: [bool; U],
 }
 
@@ -49,7 +49,7 @@ impl<const U: usize, const N: usize> Stage<U, N> {
     /// Size of the state.
     const X: usize = N - U;
 
-    /// A stage that adds nothing and costs nothing.
+    /// A stage without growth and without second derivatives.
     pub fn zero() -> Self {
         Self {
             growth_by_first: ByControls::zeros(),
@@ -80,16 +80,16 @@ impl<const U: usize, const N: usize> Stage<U, N> {
     }
 }
 
-/// What a node adds of its own: second derivative by its unknowns.
+/// Second derivative by the unknowns of a single node.
 #[derive(Debug, Clone, Copy)]
-pub struct NodeTerm<const N: usize> {
-    /// Which node.
-    pub node: usize,
+pub(crate) struct NodeTerm<const N: usize> {
+    /// The node.
+    pub(crate) node: usize,
     /// Second derivative.
-    pub hessian: NodeMatrix<N>,
+    pub(crate) hessian: NodeMatrix<N>,
 }
 
-/// The part of the second derivatives that does not change with the barrier.
+/// Growth of the states along the chain, and the second derivatives that do not depend on the barrier.
 #[derive(Debug, Clone)]
 pub struct Chain<const U: usize, const N: usize> {
     /// The stages in order.
@@ -98,19 +98,19 @@ pub struct Chain<const U: usize, const N: usize> {
     pub first_free: [bool; U],
 }
 
-/// The rest of them.
+/// Second derivatives that depend on the barrier.
 #[derive(Debug, Clone)]
 pub struct Diagonal<const X: usize, const U: usize, const N: usize> {
     /// Second derivative by the controls at both ends of every stage.
     pub controls: Vec<StageMatrix<U>>,
-    /// Second derivative by the state of every node; empty where there is none.
+    /// Second derivative by the state of every node; empty where all are zero.
     pub states: Vec<SMatrix<f64, X, X>>,
     /// Terms at single nodes, by rising node.
-    pub nodes: Vec<NodeTerm<N>>,
+    pub(crate) nodes: Vec<NodeTerm<N>>,
 }
 
 impl<const X: usize, const U: usize, const N: usize> Diagonal<X, U, N> {
-    /// Takes a multiple of a metric off.
+    /// Subtracts a multiple of a metric from the second derivatives by the states.
     pub(super) fn shift(&mut self, metric: &[SMatrix<f64, X, X>], by: f64) {
         self.states.resize(metric.len(), SMatrix::zeros());
         for (state, metric) in self.states.iter_mut().zip(metric) {
@@ -122,8 +122,8 @@ impl<const U: usize, const N: usize> Chain<U, N> {
     /// Size of the state.
     const X: usize = N - U;
 
-    /// Moves the gradient by controls that follow the one before to that one, and drops it where they are locked: the rest
-    /// is the gradient by the unknowns.
+    /// Turns a gradient by all controls into a gradient by the free controls: entries of tied controls move to the control
+    /// before, and entries of locked controls become zero.
     pub fn fold(&self, gradient: &mut [NodeVector<N>]) {
         for (k, stage) in self.stages.iter().enumerate().rev() {
             for i in 0..U {
@@ -141,7 +141,7 @@ impl<const U: usize, const N: usize> Chain<U, N> {
         }
     }
 
-    /// Moves a gradient by the states of all nodes to the controls that they grow by and the first state.
+    /// Turns a gradient by the states of all nodes into a gradient by the first state and the controls.
     pub fn carry_back(&self, gradient: &mut [NodeVector<N>]) {
         for (k, stage) in self.stages.iter().enumerate().rev() {
             let beyond = gradient[k + 1].data.0[0];
@@ -174,7 +174,7 @@ impl<const U: usize, const N: usize> Chain<U, N> {
     }
 
     /// Second derivative of the objective along two steps whose states have been carried along.
-    pub fn second_derivative<const X: usize>(
+    pub(crate) fn second_derivative<const X: usize>(
         &self,
         diagonal: &Diagonal<X, U, N>,
         a: &[NodeVector<N>],

@@ -8,9 +8,9 @@ use nalgebra::{DMatrix, SMatrix, SVector, SymmetricEigen};
 pub struct PairMatrix<const M: usize> {
     /// Second derivative by the numbers at the first node.
     pub first: SMatrix<f64, M, M>,
-    /// By those at the first node (rows) and at the second one (columns).
+    /// Second derivative by the numbers at the first node (rows) and at the second node (columns).
     pub mixed: SMatrix<f64, M, M>,
-    /// By those at the second node.
+    /// Second derivative by the numbers at the second node.
     pub second: SMatrix<f64, M, M>,
 }
 
@@ -21,7 +21,7 @@ pub type StageMatrix<const U: usize> = PairMatrix<U>;
 pub(super) type Square<const M: usize> = (f64, [SVector<f64, M>; 2]);
 
 impl<const M: usize> PairMatrix<M> {
-    /// A form that is zero.
+    /// The zero form.
     pub fn zeros() -> Self {
         Self {
             first: SMatrix::zeros(),

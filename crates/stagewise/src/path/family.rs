@@ -1,9 +1,9 @@
-//! Programmes by one parameter.
+//! One-parameter families of programmes.
 
 use crate::linear::{Direction, Response};
 use crate::program::{Distance, Program, Scales, Stationary};
 
-/// Programmes by one parameter.
+/// A one-parameter family of programmes.
 pub trait Family<const X: usize, const U: usize, const N: usize> {
     /// A point of every programme.
     type Point: Distance;
@@ -13,14 +13,14 @@ pub trait Family<const X: usize, const U: usize, const N: usize> {
     /// The programme at a value of the parameter; `None` where there is none.
     fn at(&self, parameter: f64) -> Option<Self::Program>;
 
-    /// Units of the programmes; the parameter is measured in that of distance.
+    /// Units of the programmes; the unit of the parameter is that of distance.
     fn scales(&self) -> Scales {
         Scales::default()
     }
 
-    /// Derivative by the parameter of the first-order conditions of the programme there; `None` where it cannot be found.
+    /// Derivative by the parameter of the first-order conditions of the programme there; `None` where it cannot be evaluated.
     ///
-    /// Unless the family knows better: [`by_differences`].
+    /// By default [`by_differences`].
     fn conditions_by_parameter(
         &self,
         _program: &Self::Program,
@@ -41,7 +41,7 @@ pub fn by_differences<F, const X: usize, const U: usize, const N: usize>(
 where
     F: Family<X, U, N> + ?Sized,
 {
-    /// Step of the differences, in the unit of distance.
+    /// Step of the finite differences in the parameter; in [`Scales::distance`].
     const STEP: f64 = 1e-5;
     let h = STEP * family.scales().distance;
     let conditions = |parameter: f64| {
@@ -59,7 +59,7 @@ where
     Some(high)
 }
 
-/// A single programme is a family too.
+/// A family whose programme does not depend on the parameter.
 pub(super) struct Alone<'a, P>(pub(super) &'a P);
 
 impl<'a, P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> Family<X, U, N>

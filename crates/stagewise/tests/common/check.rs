@@ -164,7 +164,7 @@ pub(crate) fn check_linear_algebra<P, const X: usize, const U: usize, const N: u
     let modes = lowest_modes(program, &mut at, 3).expect("modes");
     for (mode, exact) in modes.iter().zip(&exact) {
         let error = (mode.eigenvalue - exact).abs();
-        // The stiffness of active inequalities takes some digits off the dense matrices.
+        // The stiffness of active inequalities costs dense matrices some digits.
         assert!(
             error < 1e-4 * exact.abs().max(1.0),
             "{} for {exact}",

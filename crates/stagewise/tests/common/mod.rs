@@ -11,7 +11,7 @@ use nalgebra::{SMatrix, SVector};
 use stagewise::{Outcome, Program, Settings, Solution, minimise};
 use std::ops::ControlFlow;
 
-/// Never asks to end.
+/// Never interrupts.
 pub(crate) fn go_on() -> ControlFlow<()> {
     ControlFlow::Continue(())
 }

@@ -7,8 +7,7 @@ pub(crate) use super::jets::Number;
 use super::jets::{Jet, W, congruent, gradient, hessian, jets, padded, weighted};
 use nalgebra::{SMatrix, SVector};
 use stagewise::{
-    Distance, Layout, Linearisation, Multipliers, NodeMatrix, NodeVector, PairMatrix, Program,
-    Values,
+    Layout, Linearisation, Multipliers, NodeMatrix, NodeVector, PairMatrix, Program, Values,
 };
 
 /// A problem of optimal control on a chain. Rows of constraints come block by block, as the layout has them.
@@ -20,11 +19,6 @@ pub(crate) trait Problem<const X: usize, const U: usize, const N: usize>: Clone 
 
     /// What a stage costs.
     fn cost<D: Number>(&self, stage: usize, x: [D; X], u: [[D; U]; 2]) -> D;
-
-    /// What the state of the last node costs.
-    fn last_cost<D: Number>(&self, _x: [D; X]) -> D {
-        D::zero()
-    }
 
     fn equalities_at<D: Number>(&self, _block: usize, _x: [D; X], _u: [D; U]) -> Vec<D> {
         Vec::new()
@@ -51,7 +45,7 @@ pub(crate) trait Problem<const X: usize, const U: usize, const N: usize>: Clone 
         [true; U]
     }
 
-    /// Square of how far a change of the state moves a node, with its share.
+    /// Metric of a node: squared length of a change of its state, times the node's share in the whole.
     fn metric(&self, node: usize) -> SMatrix<f64, X, X> {
         SMatrix::identity() * Problem::layout(self).node_weights()[node]
     }
@@ -83,19 +77,6 @@ impl<const X: usize, const U: usize> Trajectory<X, U> {
             x: vec![SVector::from(first); u.len()],
             u,
         }
-    }
-}
-
-impl<const X: usize, const U: usize> Distance for Trajectory<X, U> {
-    fn copy_from(&mut self, other: &Self) {
-        self.x.copy_from_slice(&other.x);
-        self.u.copy_from_slice(&other.u);
-    }
-
-    fn distance(&self, other: &Self) -> f64 {
-        let squares = self.x.iter().zip(&other.x);
-        let squares = squares.map(|(a, b)| (a - b).norm_squared());
-        (squares.sum::<f64>() / self.x.len() as f64).sqrt()
     }
 }
 
@@ -211,7 +192,6 @@ impl<P: Problem<X, U, N>, const X: usize, const U: usize, const N: usize> Progra
             values.slacks.extend(self.problem.stage_slacks(k, u));
             point.x[k + 1] = SVector::from(self.problem.carry(k, x, u));
         }
-        values.objective += self.problem.last_cost(bare(stages, point).0);
         for (i, block) in layout.equalities_at().iter().enumerate() {
             let (x, u) = bare(block.at, point);
             values
@@ -263,11 +243,6 @@ impl<P: Problem<X, U, N>, const X: usize, const U: usize, const N: usize> Progra
         let mut pulls = vec![[SVector::<f64, X>::zeros(); 2]; stages + 1];
         self.linearise_equalities(point, multipliers, &transport, &mut pulls, into);
         self.linearise_slacks(point, multipliers, &transport, &mut pulls, into);
-        let last = self.problem.last_cost(jets(&point.x[stages], 0));
-        pulls[stages]
-            .iter_mut()
-            .for_each(|pull| *pull += gradient::<X>(&last, 0));
-        into.diagonal.states[stages] += congruent(&transport[stages], &hessian(&last, [0, 0]));
         let mut row = self.problem.layout().inequalities_at_stages();
         for k in (0..stages).rev() {
             let x = jets(&point.x[k], 0);

@@ -243,9 +243,7 @@ fn test_gradient_and_hessian_agree_with_finite_differences() {
                 + value(&[(a.0, a.1, -h), (b.0, b.1, -h)]))
                 / (4.0 * h * h);
             let (along_a, along_b) = (unit(&linear, *a), unit(&linear, *b));
-            let exact = linear
-                .chain
-                .second_derivative(&linear.diagonal, &along_a, &along_b);
+            let exact = linear.second_derivative(&along_a, &along_b);
             assert!(
                 (second - exact).abs() < 2e-5 * exact.abs().max(10.0),
                 "{a:?} {b:?} {second} {exact}"
@@ -275,9 +273,7 @@ fn dense_modes(program: &BeltProgram, at: &Stationary<BeltPoint>) -> Vec<f64> {
         rates.sum::<f64>()
     };
     let second = square(&|i, j| {
-        let own = linear
-            .chain
-            .second_derivative(&linear.diagonal, &steps[i], &steps[j]);
+        let own = linear.second_derivative(&steps[i], &steps[j]);
         let stages = 0..layout.stages();
         let rows = stages.flat_map(|k| layout.stage_rows(k).map(move |row| (k, row)));
         let touched = linear.node_slacks.iter().zip(layout.inequalities_at());

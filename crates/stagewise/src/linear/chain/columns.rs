@@ -11,7 +11,7 @@ pub(super) fn add_scaled<const N: usize>(into: &mut [f64; N], by: f64, column: &
     }
 }
 
-/// A column, and to it the columns of the cost by the states, each times the growth of its state.
+/// A column plus the columns of the cost by the states, each times the growth of its state.
 #[inline(always)]
 pub(super) fn carried<const N: usize>(
     mut column: [f64; N],
@@ -25,7 +25,7 @@ pub(super) fn carried<const N: usize>(
     column
 }
 
-/// Scalar product of two states, by pairs of entries so that the additions need not wait for each other.
+/// Scalar product of two states, summed by pairs of entries to shorten the chain of dependent additions.
 #[inline(always)]
 pub(super) fn dot_states<const U: usize, const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
     let states = N - U;
@@ -44,7 +44,7 @@ pub(super) fn dot_states<const U: usize, const N: usize>(a: &[f64; N], b: &[f64;
     sum
 }
 
-/// A sum of products, one a control, in order.
+/// Sum of products over the controls, in order.
 #[inline(always)]
 pub(super) fn weighted<const U: usize>(a: impl Fn(usize) -> f64, b: impl Fn(usize) -> f64) -> f64 {
     let mut sum = a(0) * b(0);

@@ -8,8 +8,8 @@ use crate::linear::small::{invert, invert_indefinite};
 use multiversion::multiversion;
 use nalgebra::{ArrayStorage, Cholesky, Const};
 
-/// What the elimination of one stage's second controls leaves behind: they are −`gain`ᵀ times the node's unknowns, less
-/// `inverse` times the force on them.
+/// Elimination of one stage's second controls: the controls are −`gain`ᵀ times the first node's unknowns, less `inverse`
+/// times the force on the controls.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Elimination<const U: usize, const N: usize> {
     pub(super) inverse: [[f64; U]; U],
@@ -24,17 +24,17 @@ pub(super) enum First<const N: usize> {
     Indefinite(NodeMatrix<N>),
 }
 
-/// A factorised chain, and room for the forces of one right-hand side.
+/// A factorised chain, and a work array for the forces of one right-hand side.
 #[derive(Debug, Clone)]
-pub struct Factor<const U: usize, const N: usize> {
+pub(crate) struct Factor<const U: usize, const N: usize> {
     pub(super) eliminations: Vec<Elimination<U, N>>,
     pub(super) first: First<N>,
     pub(super) forces: Vec<[f64; U]>,
 }
 
 impl<const U: usize, const N: usize> Factor<U, N> {
-    /// Room for a chain of so many stages.
-    pub fn new(stages: usize) -> Self {
+    /// Memory for a chain of a number of stages.
+    pub(crate) fn new(stages: usize) -> Self {
         let nothing = Elimination {
             inverse: [[0.0; U]; U],
             gain: [[0.0; N]; U],
@@ -48,7 +48,7 @@ impl<const U: usize, const N: usize> Factor<U, N> {
 }
 
 impl<const N: usize> First<N> {
-    /// Factorises a matrix with at most so many negative eigenvalues, and counts them.
+    /// Factorises a matrix with at most `most` negative eigenvalues, and counts its negative eigenvalues.
     fn factorise(matrix: &NodeMatrix<N>, most: usize) -> Result<(Self, usize), TooConcave> {
         if let Some(cholesky) = Cholesky::new(*matrix) {
             return Ok((Self::Positive(cholesky), 0));
@@ -69,8 +69,8 @@ impl<const U: usize, const N: usize> Chain<U, N> {
     /// Factorises the chain with `damping` added to the second derivative by the unknowns: the first state, and every
     /// control times the node's weight. Gives the number of concave directions, of `most` that are allowed.
     ///
-    /// Errors: [`TooConcave`] where there are more, or a direction of no curvature.
-    pub fn factorise<const X: usize>(
+    /// Errors: [`TooConcave`] where more directions are concave, or a direction has zero curvature.
+    pub(crate) fn factorise<const X: usize>(
         &self,
         diagonal: &Diagonal<X, U, N>,
         damping: f64,
@@ -93,8 +93,8 @@ impl<const U: usize, const N: usize> Chain<U, N> {
     }
 }
 
-/// Eliminates the second controls of every stage, from the last to the first; the cost as a function of the first node's
-/// unknowns, and in how many directions it was concave.
+/// Eliminates the second controls of every stage, from the last to the first; gives the cost as a function of the first
+/// node's unknowns, and the number of concave directions.
 #[multiversion(targets("x86_64+avx2"))]
 fn eliminate_all<const X: usize, const U: usize, const N: usize>(
     chain: &Chain<U, N>,
@@ -132,8 +132,8 @@ fn eliminate_all<const X: usize, const U: usize, const N: usize>(
     Ok((NodeMatrix::from_array_storage(ArrayStorage(cost)), concave))
 }
 
-/// Eliminates the free part of a stage's second controls from the cost beyond it, which becomes the cost before it; gives
-/// the number of directions in which that was concave.
+/// Eliminates the free part of a stage's second controls: turns the cost beyond the stage into the cost before the stage, and
+/// gives the number of concave directions.
 #[inline(always)]
 fn eliminate<const U: usize, const N: usize>(
     stage: &Stage<U, N>,
@@ -207,7 +207,7 @@ fn eliminate<const U: usize, const N: usize>(
     Ok(concave)
 }
 
-/// Lets the first controls bear what the second cost that follow them.
+/// Adds the cost of tied second controls to the cost of the first controls.
 fn follow<const U: usize, const N: usize>(
     stage: &Stage<U, N>,
     pivot: &[[f64; U]; U],
@@ -229,7 +229,7 @@ fn follow<const U: usize, const N: usize>(
     }
 }
 
-/// Makes an entry of the unknowns its own, unit, equation.
+/// Replaces the equation of an entry by `entry = right-hand side`.
 #[inline(always)]
 fn lock<const N: usize>(matrix: &mut NodeMatrix<N>, entry: usize) {
     matrix.row_mut(entry).fill(0.0);

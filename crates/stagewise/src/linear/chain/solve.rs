@@ -8,7 +8,7 @@ impl<const U: usize, const N: usize> Chain<U, N> {
     /// The step of least cost under a gradient by the unknowns of every node.
     ///
     /// Shapes: `gradient` and `step` have one entry a node.
-    pub fn solve(
+    pub(crate) fn solve(
         &self,
         factor: &mut Factor<U, N>,
         gradient: &[NodeVector<N>],
@@ -25,7 +25,7 @@ impl<const U: usize, const N: usize> Chain<U, N> {
     }
 }
 
-/// Gradient of the cost-to-go by the first node's unknowns; leaves the force on every stage's second controls behind.
+/// Gradient of the cost-to-go by the first node's unknowns; stores the force on every stage's second controls.
 #[multiversion(targets("x86_64+avx2"))]
 fn gather<const U: usize, const N: usize>(
     chain: &Chain<U, N>,
@@ -62,7 +62,7 @@ fn gather<const U: usize, const N: usize>(
     NodeVector::from(cost)
 }
 
-/// Carries a step on from the first node along the chain, all controls as they were eliminated.
+/// Back substitution from the first node along the chain: controls by their elimination, states by their growth.
 #[multiversion(targets("x86_64+avx2"))]
 fn spread<const U: usize, const N: usize>(
     chain: &Chain<U, N>,
