@@ -29,7 +29,7 @@ impl Tracker {
     }
 
     fn lock(&self) -> MutexGuard<'_, core::Tracker> {
-        // An update that has panicked is not gone on with.
+        // A poisoned lock is taken all the same: an update that has panicked is not resumed.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -38,7 +38,7 @@ impl Tracker {
 impl Tracker {
     /// (status, snapped, energy, iterations, largest residual).
     ///
-    /// Errors: whatever a signal handler raises, `KeyboardInterrupt` first of all.
+    /// Errors: those that a signal handler raises, `KeyboardInterrupt` first of all.
     fn update(
         &self,
         py: Python<'_>,
@@ -63,7 +63,7 @@ impl Tracker {
         }
     }
 
-    /// The present scenario and all that is to be known of its equilibrium.
+    /// The present scenario and its equilibrium.
     fn equilibrium(&self, py: Python<'_>) -> (Scenario, Equilibrium) {
         py.detach(|| {
             let found = Equilibrium::of(|| self.lock().equilibrium());
