@@ -21,23 +21,23 @@ use std::ops::ControlFlow;
 use std::time::Instant;
 
 impl Equilibrium {
-    /// Solves and takes the time.
+    /// Solves, with the time of the solve.
     pub(crate) fn timed(problem: &Problem, proceed: &mut dyn FnMut() -> ControlFlow<()>) -> Self {
         Self::of(|| fishbone::solve::solve(problem, proceed))
     }
 
-    /// What was found.
+    /// The equilibrium found.
     pub(crate) fn core(&self) -> &equilibrium::Equilibrium {
         &self.solved
     }
 
-    /// What is found, with the time that took.
+    /// The equilibrium of a search, with the time of the search.
     pub(crate) fn of(find: impl FnOnce() -> equilibrium::Equilibrium) -> Self {
         let Ok(found) = Self::try_of(|| Ok::<_, Infallible>(find()));
         found
     }
 
-    /// The same of what may not be found.
+    /// The equilibrium of a search that may fail, with the time of the search.
     pub(crate) fn try_of<E>(
         find: impl FnOnce() -> Result<equilibrium::Equilibrium, E>,
     ) -> Result<Self, E> {
@@ -240,14 +240,14 @@ impl Equilibrium {
         (highest.u, array::row(&highest.position))
     }
 
-    /// (value, u, v), or None where the belt does not bend.
+    /// (value, u, v), or None of a flat belt.
     #[getter]
     fn least_bend_radius(&self) -> Option<(f64, f64, f64)> {
         let least = surface::least_bend_radius(&self.solved.spine)?;
         Some((least.value, least.u, least.v))
     }
 
-    /// (value, u), or None where the belt does not bend.
+    /// (value, u), or None of a flat belt.
     #[getter]
     fn least_spine_radius(&self) -> Option<(f64, f64)> {
         let least = surface::least_spine_radius(&self.solved.spine)?;
@@ -261,7 +261,7 @@ impl Equilibrium {
         (margin.value, margin.u)
     }
 
-    /// (u, u) of the first two places that pass through each other, or None where none do.
+    /// (u, u) of the first two places that pass through each other, or None if there are none.
     #[getter]
     fn crosses_itself(&self) -> Option<(f64, f64)> {
         surface::crosses_itself(&self.solved.spine).map(<(f64, f64)>::from)
@@ -330,7 +330,7 @@ impl Equilibrium {
         )
     }
 
-    /// The surface's points that were these points of the flat board; NaN off the board.
+    /// The surface's points of points of the flat board; NaN off the board.
     ///
     /// Shapes: (m, 2) to (m, 3).
     fn material_points<'py>(&self, py: Python<'py>, flat: Vec<[f64; 2]>) -> Points<'py> {
@@ -355,7 +355,7 @@ impl Equilibrium {
         feet.into_pyarray(py)
     }
 
-    /// From where to where along the spine each stiffened stretch goes.
+    /// (from, to), the arc lengths of the ends of every stiffened stretch.
     #[getter]
     fn stiffeners(&self) -> Vec<(f64, f64)> {
         let spine = &self.solved.spine;
@@ -366,9 +366,9 @@ impl Equilibrium {
             .collect()
     }
 
-    /// The scenario with another number of elements and the same equilibrium there; None where there is none like it.
+    /// The scenario with another number of elements and its equilibrium next to this one; None if there is none.
     ///
-    /// Errors: whatever a signal handler raises, `KeyboardInterrupt` first of all.
+    /// Errors: those that a signal handler raises, `KeyboardInterrupt` first of all.
     fn refined(&self, py: Python<'_>, elements: usize) -> PyResult<Option<(Scenario, Self)>> {
         let mut signals = Signals::new();
         let start = Instant::now();
@@ -384,9 +384,9 @@ impl Equilibrium {
     }
 
     /// (distance, direction, whether it is a fold, position, rotation vector) of the nearest loss of stability, along a
-    /// direction or wherever it is; None where there is none within reach.
+    /// given direction or along any; None if there is none within reach.
     ///
-    /// Errors: `NoMargin`; whatever a signal handler raises.
+    /// Errors: `NoMargin`; those that a signal handler raises.
     #[pyo3(signature = (support, direction, reach))]
     fn margin(
         &self,
@@ -438,7 +438,7 @@ impl Equilibrium {
         Ok(modes.into_iter().map(mode).collect())
     }
 
-    /// Its first-order conditions, factorised with the GIL released.
+    /// The first-order conditions of the equilibrium, factorised with the GIL released.
     ///
     /// Errors: `NoSensitivity`.
     fn sensitivity(&self, py: Python<'_>) -> PyResult<Sensitivity> {

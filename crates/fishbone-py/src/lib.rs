@@ -35,6 +35,7 @@ mod _core {
     #[pymodule_export]
     use crate::tracker::Tracker;
 
+    /// Version of the package, a word.
     #[pymodule_export]
     #[expect(non_upper_case_globals, reason = "the name Python expects")]
     const __version__: &str = env!("CARGO_PKG_VERSION");

@@ -4,10 +4,10 @@ use pyo3::prelude::*;
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
-/// Short enough for Ctrl-C to feel immediate, long enough to cost nothing.
+/// Interval between checks for signals, in ms: short enough for Ctrl-C to feel immediate, long enough to cost nothing.
 pub(crate) const SIGNAL_INTERVAL: Duration = Duration::from_millis(50);
 
-/// Asks Python now and then whether a signal has arrived.
+/// Checks with Python, once an interval, whether a signal has arrived.
 pub(crate) struct Signals {
     asked: Instant,
     pub(crate) raised: Option<PyErr>,
@@ -25,16 +25,16 @@ impl Signals {
         self.proceed_with(|_| Ok(()))
     }
 
-    /// The same, with something to be told to Python whenever it is asked.
+    /// Whether to go on, with a report to Python at every check.
     pub(crate) fn proceed_with(
         &mut self,
-        tell: impl FnOnce(Python<'_>) -> PyResult<()>,
+        report: impl FnOnce(Python<'_>) -> PyResult<()>,
     ) -> ControlFlow<()> {
         if self.raised.is_none() && self.asked.elapsed() >= SIGNAL_INTERVAL {
             self.asked = Instant::now();
             let asked = Python::attach(|py| {
                 py.check_signals()?;
-                tell(py)
+                report(py)
             });
             self.raised = asked.err();
         }

@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 
 /// Solves a scenario with the GIL released.
 ///
-/// Errors: whatever a signal handler raises, `KeyboardInterrupt` first of all.
+/// Errors: those that a signal handler raises, `KeyboardInterrupt` first of all.
 #[pyfunction]
 pub(crate) fn solve(py: Python<'_>, scenario: &Scenario) -> PyResult<Equilibrium> {
     let mut signals = Signals::new();
@@ -22,8 +22,8 @@ pub(crate) fn solve(py: Python<'_>, scenario: &Scenario) -> PyResult<Equilibrium
 /// Solves a scenario from a shape with the GIL released: bend and rib slope at equal steps of the arc length.
 ///
 /// Shapes: (m,) both.
-/// Errors: `ValueError`, one line, where these are no shape; whatever a signal handler raises, `KeyboardInterrupt` first of
-/// all.
+/// Errors: `ValueError`, one line, if the arrays are no shape; those that a signal handler raises, `KeyboardInterrupt` first
+/// of all.
 #[pyfunction]
 pub(crate) fn solve_from(
     py: Python<'_>,

@@ -18,7 +18,7 @@ pub(crate) struct Tracker(Mutex<core::Tracker>);
 
 impl Tracker {
     fn lock(&self) -> MutexGuard<'_, core::Tracker> {
-        // An update that has panicked is not gone on with.
+        // A poisoned lock is taken all the same: an update that has panicked is not resumed.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -37,7 +37,7 @@ impl Tracker {
 
     /// (status, snapped, energy, iterations, largest residual).
     ///
-    /// Errors: whatever a signal handler raises, `KeyboardInterrupt` first of all.
+    /// Errors: those that a signal handler raises, `KeyboardInterrupt` first of all.
     fn update(
         &self,
         py: Python<'_>,
@@ -62,7 +62,7 @@ impl Tracker {
         }
     }
 
-    /// The present scenario and all that is to be known of its equilibrium.
+    /// The present scenario and its equilibrium.
     fn equilibrium(&self, py: Python<'_>) -> (Scenario, Equilibrium) {
         py.detach(|| {
             let found = Equilibrium::of(|| self.lock().equilibrium());

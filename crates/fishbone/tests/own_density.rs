@@ -1,4 +1,4 @@
-//! A density of one's own, with a field of its own, is solved by the programme as it is.
+//! A density defined outside the crate, with a third field, is solved by the programme unchanged.
 
 use fishbone::geometry::Pose;
 use fishbone::problem::program::{BeltPoint, BeltProgram, Hold, NodeSupport, Piece};
@@ -11,7 +11,7 @@ use num_dual::DualNum;
 use stagewise::{Linearisation, Multipliers, NodeVector, Outcome, Program, Settings, Values};
 use std::ops::ControlFlow;
 
-// A strip whose ribs need not be exact: a twist m besides that of the ribs, paid for by the density's own stiffness.
+// A strip whose ribs need not be exact: a twist m in addition to the ribs' twist, resisted by the density's own stiffness.
 #[derive(Debug, Clone, PartialEq)]
 struct Relaxed {
     stiffness: f64,
@@ -37,6 +37,7 @@ impl Density<3> for Relaxed {
 
 type Relax = BeltProgram<Relaxed, 3, 9>;
 
+/// Elements of the test belt, a number.
 const ELEMENTS: usize = 40;
 
 fn program(stiffness: f64) -> Relax {
@@ -98,7 +99,7 @@ fn test_a_density_with_a_third_field_is_solved_and_softens_with_its_stiffness() 
 }
 
 #[test]
-fn test_derivatives_of_a_density_of_ones_own_agree_with_finite_differences() {
+fn test_derivatives_of_an_outside_density_agree_with_finite_differences() {
     let program = program(1.0);
     let at = start(&program);
     let layout = program.layout();

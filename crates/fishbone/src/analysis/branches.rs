@@ -1,5 +1,5 @@
-//! All equilibria of a problem that the search finds: many starts, then perturbations of each minimum and continuation in
-//! modal loads from each equilibrium.
+//! A search for all equilibria of a problem: many starts, then perturbations of each minimum and continuation in modal loads
+//! from each equilibrium.
 //!
 //! The starts are arches to either side with waves of bend and of rib slope laid over them, and lead to minima. A minimum
 //! perturbed along its lowest modes leads downhill to other minima. A load along one of the lowest modes of an equilibrium,
@@ -27,12 +27,12 @@ type Mode = stagewise::Mode<8>;
 /// Runs `task(i)` for every i below a number, in any order and on any thread.
 pub(crate) type Run<'a> = dyn Fn(usize, &(dyn Fn(usize) + Sync)) + 'a;
 
-/// What is asked and reported while the search goes on, from any thread.
+/// Control and progress of the search, from any thread.
 pub trait Watch: Sync {
     /// Whether to go on.
     fn proceed(&self) -> ControlFlow<()>;
 
-    /// Number of tasks done, and of tasks planned so far.
+    /// Reports the number of tasks done, and of tasks planned by now.
     fn report(&self, done: usize, planned: usize);
 }
 
@@ -44,9 +44,8 @@ pub fn one_by_one(count: usize, task: &(dyn Fn(usize) + Sync)) {
 /// The equilibria of a problem, rising in energy: minima, and saddles with one or two
 /// negative modes.
 ///
-/// Of shapes that are mirror images of each other the one is reported that bulges as the scenario asks. The same input gives
-/// the same output, whatever runs the tasks. Where nothing is found, the outcome of a solve is reported, whose message gives
-/// the reason.
+/// Of mirror images the one that bulges along `solver.bulge` is reported. The same input gives the same output, however the
+/// tasks are run. If nothing is found, the outcome of a solve is reported, whose message gives the reason.
 pub fn branches(
     problem: &Problem,
     settings: &SearchSettings,
@@ -82,7 +81,7 @@ pub fn branches(
     found
 }
 
-/// What has been found so far.
+/// The equilibria found so far.
 struct Census<'a> {
     problem: &'a Problem,
     settings: &'a SearchSettings,
@@ -94,7 +93,7 @@ struct Census<'a> {
 }
 
 impl Census<'_> {
-    /// Runs a task for each item; what comes out, in the order of the items.
+    /// Runs a task for each item; returns the results in the order of the items.
     fn each<T: Sync, R: Send + Sync>(
         &mut self,
         items: &[T],
@@ -132,7 +131,7 @@ impl Census<'_> {
         }
     }
 
-    /// The equilibria lowest in energy among those that `may` be chosen and are like none `known`; they are known from then on.
+    /// The equilibria lowest in energy that `may` be chosen and are like none `known`; they are added to `known`.
     fn lowest_unlike(
         &self,
         known: &mut Vec<Equilibrium>,
@@ -168,8 +167,8 @@ impl Census<'_> {
         }
     }
 
-    /// Perturbs the minima along their lowest modes, the lowest in energy first, and the minima found so in turn; of minima
-    /// that are alike one.
+    /// Perturbs the minima along their lowest modes, the lowest in energy first, and the minima found in this way in turn;
+    /// of minima that are alike only one.
     fn perturb(&mut self) {
         let mut perturbed = Vec::new();
         loop {
@@ -192,7 +191,8 @@ impl Census<'_> {
         }
     }
 
-    /// Continues the equilibria in loads along their lowest modes, the lowest in energy first, and those found so in turn.
+    /// Continues the equilibria in loads along their lowest modes, the lowest in energy first, and the equilibria found in
+    /// this way in turn.
     fn load(&mut self) {
         let mut continued = Vec::new();
         loop {
@@ -224,7 +224,8 @@ impl Census<'_> {
         }
     }
 
-    /// Keeps the equilibria that a mesh twice as fine has too; of equilibria that the mesh does not separate the lowest.
+    /// Keeps the equilibria that are confirmed on a mesh twice as fine; of equilibria that this mesh does not separate, the
+    /// lowest.
     fn confirm(&mut self) {
         let mut found = std::mem::take(&mut self.found);
         found.sort_by(|a, b| a.energy.total_cmp(&b.energy));
@@ -249,7 +250,7 @@ impl Census<'_> {
         }
     }
 
-    /// Takes the mirror image of a minimum for it, where that meets the supports too and bulges more as asked.
+    /// Replaces a minimum by its mirror image if the image meets the supports too and bulges more along `solver.bulge`.
     fn face(&mut self) {
         let found = std::mem::take(&mut self.found);
         let (settings, watch) = (self.settings, self.watch);
@@ -259,13 +260,13 @@ impl Census<'_> {
     }
 }
 
-/// The mirror image that bulges most, where it does so more than the minimum itself.
+/// The mirror image that bulges most; `None` unless it bulges more than the minimum itself.
 fn facing(
     settings: &SearchSettings,
     found: &Equilibrium,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Option<Equilibrium> {
-    /// Mirrors: signs of bend and of rib slope.
+    /// Mirrors, as signs of bend and of rib slope, dimensionless.
     const MIRRORS: [[f64; 2]; 3] = [[-1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]];
     let solved = found.solved.as_ref()?;
     let stable = found.stability.is_none_or(|s| s.negative_modes == 0);
@@ -289,7 +290,7 @@ fn facing(
     settings.is_higher(&highest, found).then_some(highest)
 }
 
-/// The same equilibrium on a mesh twice as fine; `None` where there is none like it.
+/// The same equilibrium on a mesh twice as fine; `None` if it is unconfirmed on refinement.
 fn on_finer_mesh(
     settings: &SearchSettings,
     found: &Equilibrium,
@@ -310,7 +311,7 @@ fn lowest_modes(equilibrium: &Equilibrium, count: usize) -> Vec<Mode> {
     modes.unwrap_or_default()
 }
 
-/// The minima that are found from where a minimum has been displaced far along a mode.
+/// The minima found from a minimum displaced far along a mode.
 fn perturbed_along(
     problem: &Problem,
     settings: &SearchSettings,
@@ -327,7 +328,7 @@ fn perturbed_along(
         .collect()
 }
 
-/// The equilibrium that a modal load leads to and, where that is a saddle, the minima downhill on either side.
+/// The equilibrium to which a modal load leads and, if it is a saddle, the minima downhill on either side.
 fn beyond_modal_load(
     problem: &Problem,
     settings: &SearchSettings,
@@ -373,12 +374,12 @@ fn downhill(
         .collect()
 }
 
-/// Number of negative modes, 0 where that is open.
+/// Number of negative modes, 0 where it is undecided.
 fn index(equilibrium: &Equilibrium) -> usize {
     equilibrium.stability.map_or(0, |s| s.negative_modes)
 }
 
-/// How far an equilibrium bulges as its scenario asks.
+/// Bulge of an equilibrium along its scenario's `solver.bulge`.
 fn height(equilibrium: &Equilibrium) -> f64 {
     let bulge = equilibrium.problem.bulge();
     equilibrium.highest_point().position.dot(&bulge.normalize())

@@ -1,4 +1,4 @@
-//! The equilibria along a path, stable or not: where they fold, where others branch off, and what the belt snaps to.
+//! Continuation of equilibria along a path, stable or not: folds, bifurcations, and the minima to which the belt snaps.
 
 mod search;
 
@@ -22,15 +22,15 @@ named! {
         Range = "range",
         /// At an event beyond which the branch would be its own mirror image.
         Event = "event",
-        /// The branch has come back to where it began.
+        /// The branch has come back to its start.
         Closed = "closed",
-        /// All states that were allowed are used up.
+        /// The allowed number of states is used up.
         Budget = "budget",
         /// No step, however short, leads on.
         Lost = "lost",
-        /// Ribs reach edges beside a bend that held none before, or leave those that held them.
+        /// The active edges change at a bend of the board.
         Edges = "edges",
-        /// The belt is drawn straight.
+        /// The belt is at its inextensible limit.
         Taut = "taut",
         /// The caller asked to end.
         Interrupted = "interrupted",
@@ -50,7 +50,7 @@ impl From<stagewise::End<()>> for End {
     }
 }
 
-/// Why there is nothing to follow.
+/// The reason why an equilibrium has no branch to follow.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum NoBranch {
@@ -69,8 +69,8 @@ named!(impl NoBranch {
     ..Uncertified,
 });
 
-/// How far to look. Lengths along a branch count the parameter of the path, from 0 to its length, and the motion of the belt
-/// in U alike.
+/// Extent of a continuation. Lengths along a branch count the parameter of the path, from 0 to its length, and the motion of
+/// the belt in U alike.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
     /// Longest step along a branch.
@@ -79,25 +79,25 @@ pub struct Settings {
     pub states: usize,
     /// Most branches.
     pub branches: usize,
-    /// How the branches that cross are looked for.
+    /// Search for crossing branches.
     pub crossings: CrossingSettings,
 }
 
-/// How the branches that cross at an event are looked for, and what is taken for near and the same.
+/// Settings of the search for branches that cross at an event: its distances, and its tolerances for near and equal states.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CrossingSettings {
-    /// Distances before an apex at which a modal load leads off the branch, the first that leads to another branch is taken; in
-    /// the parameter of the path.
+    /// Distances before an apex at which a modal load leads off the branch, in the parameter of the path: tried in turn
+    /// until one leads to another branch.
     pub before: [f64; 4],
-    /// Distances to either side of a bifurcation, likewise.
+    /// Distances to either side of a bifurcation, tried likewise, in the parameter of the path.
     pub beside: [f64; 3],
-    /// Distance from the branch beyond which another does not cross at the event, in U.
+    /// Distance from the branch beyond which another branch does not cross at the event, in U.
     pub near: f64,
     /// Distance past a loss of stability at which the belt is let go downhill, in the parameter of the path.
     pub past: f64,
     /// Distance from the straight line between two states of a branch up to which a station lies on it, in U.
     pub on_branch: f64,
-    /// Sag of a branch between two states that is allowed besides, in their distance.
+    /// Sag of a branch between two states that is allowed in addition, as a share of their distance.
     pub sag: f64,
 }
 
@@ -125,12 +125,12 @@ impl Default for Settings {
     }
 }
 
-/// The branches of equilibria that hang together along a path.
+/// The connected branches of equilibria along a path.
 #[derive(Debug, Clone)]
 pub struct Diagram {
     /// The path.
     pub path: Path,
-    /// The branches: first that of the equilibrium where the path begins, then those that branch off.
+    /// The branches: first the branch of the equilibrium where the path begins, then those that branch off.
     pub branches: Vec<Branch>,
     mesh: Mesh,
     settings: Settings,
@@ -139,62 +139,62 @@ pub struct Diagram {
 /// A curve of equilibria.
 #[derive(Debug, Clone)]
 pub struct Branch {
-    /// Where it begins: at the start of the path, or at an event of another branch.
+    /// Origin at an event of another branch; `None` at the start of the path.
     pub origin: Option<Origin>,
-    /// Its states in order, those of its events among them.
+    /// States in order, including the states at its events.
     pub states: Vec<State>,
-    /// Its events in order.
+    /// Events in order.
     pub events: Vec<Event>,
-    /// Why it ends.
+    /// The reason for which it ends.
     pub end: End,
 }
 
-/// Where a branch comes from.
+/// Origin of a branch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Origin {
     /// The other branch.
     pub branch: usize,
-    /// Which of its events.
+    /// Index of that branch's event.
     pub event: usize,
 }
 
 /// An equilibrium of a branch.
 #[derive(Debug, Clone)]
 pub struct State {
-    /// How far along the path.
+    /// Place on the path.
     pub place: f64,
     /// Number of independent motions along which the energy falls.
     pub negative_modes: usize,
-    /// How far it is from a solution of its discrete equations.
+    /// Largest residuals of the state's discrete equations.
     pub residuals: Residuals,
     at: Stationary<BeltPoint>,
 }
 
-/// What a report says of a state, in the units of its scenario.
+/// Summary of a state for a report, in the units of its scenario.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Summary {
-    /// What the path calls the place.
+    /// The path's parameter at the place.
     pub parameter: f64,
     /// Total potential.
     pub energy: f64,
-    /// How far the highest point is along the bulge.
+    /// Coordinate of the highest point along the bulge.
     pub height: f64,
-    /// What the supports do to the belt, in the order of the scenario.
+    /// Reactions of the supports on the belt, in the order of the scenario.
     pub reactions: Vec<Wrench>,
-    /// Least radius of bend over the whole width, where it bends.
+    /// Least radius of bend over the whole width; `None` of a flat belt.
     pub least_bend_radius: Option<f64>,
-    /// Least radius of bend on the spine, where it bends.
+    /// Least radius of bend on the spine; `None` of a flat belt.
     pub least_spine_radius: Option<f64>,
-    /// How far the ribs are from crossing.
+    /// Margin of the ribs against crossing.
     pub rib_margin: f64,
-    /// The second variation, where it can be decided.
+    /// Stability by the second variation, where it is decided.
     pub stability: Option<Stability>,
-    /// How far it is from a solution of its discrete equations.
+    /// Largest residuals of the state's discrete equations.
     pub residuals: Residuals,
 }
 
 named! {
-    /// What happens at an event.
+    /// Kind of an event.
     #[derive(Debug, Clone, Copy, PartialEq, Eq)]
     pub enum Kind {
         /// The branch turns back.
@@ -211,22 +211,22 @@ named! {
 /// A place on a branch where the number of negative modes changes.
 #[derive(Debug, Clone)]
 pub struct Event {
-    /// What happens there.
+    /// Kind of the event.
     pub kind: Kind,
     /// The state next to it.
     pub state: usize,
-    /// How far along the path it is.
+    /// Place on the path.
     pub place: f64,
     /// Negative modes before and after.
     pub negative_modes: [usize; 2],
-    /// Where the belt goes when it is led past the loss of its stability.
+    /// The minimum to which the belt snaps when it is led past the loss of its stability.
     pub snapped: Option<Snapped>,
 }
 
-/// The minimum downhill from where stability was lost.
+/// The minimum downhill from a loss of stability.
 #[derive(Debug, Clone)]
 pub struct Snapped {
-    /// How far along the path, a little past the event.
+    /// Place on the path, a little past the event.
     pub place: f64,
     /// The minimum.
     pub equilibrium: Equilibrium,
@@ -238,7 +238,7 @@ pub struct Snapped {
 ///
 /// # Errors
 ///
-/// [`NoBranch`] unless it has converged, by a method that knows multipliers, to a single equilibrium.
+/// [`NoBranch`] unless it has converged, by a method with multipliers, to a single equilibrium.
 pub fn follow(
     equilibrium: &Equilibrium,
     path: &Path,
@@ -273,7 +273,7 @@ pub fn follow(
 }
 
 impl Summary {
-    /// Whether it is a local minimum; `None` where that cannot be decided.
+    /// Whether the state is a local minimum; `None` where this is undecided.
     pub fn stable(&self) -> Option<bool> {
         self.stability?.is_stable()
     }
@@ -303,7 +303,7 @@ impl Diagram {
         problem.expect("it was solved there")
     }
 
-    /// All that is to be known of a state.
+    /// The equilibrium of a state, with all its data.
     ///
     /// # Panics
     ///
@@ -317,7 +317,7 @@ impl Diagram {
         of_solution(&problem, program, solution)
     }
 
-    /// What a report on the path says of a state.
+    /// The summary of a state for a report on the path.
     ///
     /// # Panics
     ///

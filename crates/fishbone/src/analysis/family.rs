@@ -34,7 +34,7 @@ impl Along {
 
     /// Whether the supports are out of the belt's reach next to a place, so that the belt is near its inextensible limit.
     pub(super) fn is_near_limit(&self, place: f64) -> bool {
-        /// Distance along the path, in that of a leg.
+        /// Distance along the path to the places on either side that are examined, in legs.
         const BESIDE: f64 = 2e-3;
         let beside = [place - BESIDE, place + BESIDE].map(|place| self.path.at(place));
         let mut known = beside.iter().flatten();
@@ -50,7 +50,7 @@ impl Family<6, 2, 8> for Along {
         self.path.at(place)?.program_on(&self.mesh)
     }
 
-    /// Exact where a support moves; numbers of a scenario may change anything of the programme.
+    /// The derivative is exact where a support moves; other changes of a scenario may change any part of the programme.
     fn conditions_by_parameter(
         &self,
         program: &BeltProgram,

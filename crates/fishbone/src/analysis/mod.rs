@@ -1,4 +1,4 @@
-//! What is found out about equilibria: modes, derivatives, tracking, paths, margins, all equilibria of a problem.
+//! Analysis of equilibria: modes, derivatives, tracking, paths, margins, all equilibria of a problem.
 
 pub mod branches;
 pub mod continuation;

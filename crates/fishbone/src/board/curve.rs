@@ -4,7 +4,7 @@ use crate::board::flat::FlatFrame;
 use nalgebra::Vector2;
 use std::f64::consts::TAU;
 
-/// An exact piece of an outline.
+/// An exact piece of an outline: a line or an arc.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Curve {
     /// A straight line.
@@ -156,7 +156,7 @@ impl Curve {
     /// ½ ∫ (y dz − z dy): summed around a loop, its area.
     pub(crate) fn swept_area(&self) -> f64 {
         let (turn, length) = (self.turn(), self.length());
-        // (φ − sin φ)/φ², of which the difference leaves no digits for small φ.
+        // (φ − sin φ)/φ² by the coefficients: its difference leaves no digits for small φ.
         let bulge = match turn.abs() < 1e-2 {
             true => turn / 6.0 * (1.0 - turn * turn / 20.0),
             false => (turn - turn.sin()) / (turn * turn),
@@ -206,7 +206,7 @@ impl Curve {
     }
 }
 
-/// A fraction, held to [0, 1] where rounding has pushed it out.
+/// A fraction of a length, clamped to [0, 1] where rounding alone has carried it outside; `None` farther outside.
 fn held(fraction: f64) -> Option<f64> {
     (-1e-9..=1.0 + 1e-9)
         .contains(&fraction)

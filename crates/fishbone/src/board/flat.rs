@@ -15,7 +15,7 @@ pub struct FlatFrame {
 }
 
 impl FlatFrame {
-    /// The start of the belt.
+    /// Flat frame at the start of the belt, in the belt's unit of length and rad.
     pub(crate) const START: Self = Self {
         position: Vector2::new(0.0, 0.0),
         heading: 0.0,
@@ -79,7 +79,7 @@ impl Segment {
 /// The flat spine, laid out from the start of the belt.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct FlatSpine {
-    /// Its stretches, at least one.
+    /// Stretches in order, at least one.
     pub(crate) segments: Vec<Segment>,
     /// Frame of every node.
     pub(crate) nodes: Vec<FlatFrame>,
@@ -130,7 +130,8 @@ impl FlatSpine {
         });
     }
 
-    /// Adds an element, to the last segment where it goes on alike: positions then come from one start, not from a sum.
+    /// Adds an element: to the last segment if that has the same curvature, for positions to come from one start and not
+    /// from a sum; else as a new segment.
     fn extend(&mut self, geodesic: f64, [from, to]: [f64; 2]) {
         let here = self.end();
         let goes_on =
@@ -159,7 +160,7 @@ pub(crate) struct Round {
 }
 
 impl Round {
-    /// `None` of an open belt.
+    /// The motion of a closed belt; `None` of an open belt.
     pub(crate) fn of(spine: &Spine, flat: &FlatSpine) -> Option<Self> {
         let hand = |half_turns: i32| if half_turns % 2 == 0 { 1.0 } else { -1.0 };
         spine.half_turns.map(|half_turns| Self {

@@ -1,4 +1,4 @@
-//! The search for a minimum of which the active sets are right.
+//! The search for a minimum whose active sets are right.
 
 use super::search::Search;
 use crate::problem::Problem;
@@ -6,11 +6,11 @@ use crate::problem::program::{BeltPoint, BeltProgram};
 use stagewise::{Outcome, Solution};
 use std::ops::ControlFlow;
 
-/// Choices of the active sets, the largest number.
+/// Greatest count of choices of the active sets, a number.
 const ROUNDS: usize = 20;
 
-/// Goes on from a minimum to one for which the active sets of the programme are right, and gives the programme those; with
-/// the fault of the last sets where they are not.
+/// Goes on from a minimum to a minimum for which the programme's active sets are right, and leaves these in the programme;
+/// with the fault of the last active sets if they are not.
 pub(super) fn settle(
     problem: &Problem,
     search: &Search,

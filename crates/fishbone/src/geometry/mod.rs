@@ -159,7 +159,7 @@ pub(crate) fn magnus(twist_1: &Twist, twist_2: &Twist, h: f64) -> Twist {
     (*twist_1 + *twist_2) * (0.5 * h) + bracket(twist_1, twist_2) * (3f64.sqrt() / 12.0 * h * h)
 }
 
-/// Where the two Gauss points of an element lie, as fractions of its length.
+/// Positions of the two Gauss points of an element, as fractions of its length.
 #[inline(always)]
 pub(crate) fn gauss_points() -> [f64; 2] {
     let offset = 3f64.sqrt() / 6.0;
@@ -247,7 +247,7 @@ impl Coefficients {
         }
     }
 
-    /// The same at t ≤ 1, without a branch.
+    /// The coefficients at t ≤ 1, without a branch.
     #[inline(always)]
     pub(crate) fn near(t: f64) -> Self {
         Self::of(&stumpff_by_series(t))
@@ -282,11 +282,11 @@ fn with_derivatives(c: &[f64; 8], n: usize) -> [f64; 3] {
     [c[n], first, second]
 }
 
-/// Below this t = θ² the Stumpff functions come from their series. At t = 1 the closed forms of c₆ and c₇ have lost
-/// three digits, at t = 0.01 ten.
+/// Squared angle t = θ² below which the Stumpff functions come from their series, in rad². At t = 1 the closed forms of c₆
+/// and c₇ have lost three digits, at t = 0.01 ten.
 const SERIES_BELOW: f64 = 1.0;
 
-/// 1/n! for n = 0 … 7.
+/// Reciprocal factorials 1/n! for n = 0 … 7, dimensionless.
 const INVERSE_FACTORIAL: [f64; 8] = [
     1.0,
     1.0,
@@ -310,12 +310,14 @@ fn stumpff_by_series(t: f64) -> [f64; 8] {
     c
 }
 
-/// Terms that leave less than 1e-18 at t = 1.
+/// Terms of the series of c₆ and c₇, a number: the rest is less than 1e-18 at t = 1.
 const TERMS: usize = 9;
+/// Coefficients of the series of c₆ in powers of t, dimensionless.
 const SIXTH: [f64; TERMS] = series_coefficients(6);
+/// Coefficients of the series of c₇ in powers of t, dimensionless.
 const SEVENTH: [f64; TERMS] = series_coefficients(7);
 
-/// (−1)^k / (2k + n)!
+/// The coefficients (−1)^k / (2k + n)! of the series of c_n.
 const fn series_coefficients(n: usize) -> [f64; TERMS] {
     let mut coefficients = [INVERSE_FACTORIAL[n]; TERMS];
     let mut k = 1;
@@ -334,7 +336,7 @@ fn series(t: f64, coefficients: &[f64; TERMS]) -> f64 {
     a + t * (b + t * (c + t * (d + t * (e + t * (f + t * (g + t * (h + t * i)))))))
 }
 
-/// sin and cos, the others by c_{n+2} = (1/n! − c_n) / t.
+/// The Stumpff functions in closed form: c₀ and c₁ by cos and sin, the others by c_{n+2} = (1/n! − c_n) / t.
 fn stumpff_closed(t: f64) -> [f64; 8] {
     let theta = t.sqrt();
     let half = (0.5 * theta).sin();
@@ -385,7 +387,7 @@ pub fn frame_from_euler(euler: &Euler) -> Matrix3<f64> {
     )
 }
 
-/// Below this sin θ the first and third turns are told apart by rounding only.
+/// Sine of θ below which rounding alone separates the first turn from the third, dimensionless.
 const EULER_SINGULAR: f64 = 8.0 * f64::EPSILON;
 
 /// The Eulerian angles of a frame, θ in [0, π].

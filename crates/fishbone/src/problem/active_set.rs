@@ -1,21 +1,21 @@
-//! Inequalities of which a programme holds only those that its shape comes near.
+//! Active sets: the inequalities of a kind that a programme holds, those that its shape comes near.
 //!
-//! Which part of the board's outline stops a rib depends on the shape, as does which of two parts touches which. So a search
-//! begins without these inequalities, and goes on with those that the shape found breaks or comes near, until the set is right
-//! for the shape found with it.
+//! The part of the board's outline that stops a rib depends on the shape; so does the pair of parts in contact. So a search
+//! begins without these inequalities, and goes on with the inequalities that the shape found breaks or comes near, until the
+//! active set is right for the shape found with it.
 
 use crate::problem::program::BeltProgram;
 use crate::strip::spine::Spine;
 
 /// Inequalities of one kind, of which a programme holds an active set.
 pub(crate) trait ActiveSet {
-    /// Whether the set may be another for another shape: if not, the programme holds all that there are.
+    /// Whether the active set depends on the shape: if not, the programme holds all inequalities of the kind.
     fn depends_on_shape(&self, program: &BeltProgram) -> bool;
 
-    /// The fault of the programme's set for a shape, in words: an inequality that it lacks is broken, or one that it holds bounds
-    /// the shape without being near. `None` where the set is right.
+    /// The fault of the programme's active set for a shape, in words: an inequality outside the set is broken, or an
+    /// inequality of the set bounds the shape from afar. `None` where the set is right.
     fn fault(&self, program: &BeltProgram, shape: &Spine) -> Option<String>;
 
-    /// Gives the programme the set for a shape.
+    /// Gives the programme the active set for a shape.
     fn choose(&self, program: &mut BeltProgram, shape: &Spine);
 }

@@ -46,7 +46,7 @@ pub(crate) struct Strip {
     pub geodesic: f64,
     /// Rigidity R_f of the whole width.
     pub rigidity: Rigidity,
-    /// What it is bent to when nothing acts on it.
+    /// Natural bend.
     pub curl: Curl,
 }
 
@@ -62,16 +62,18 @@ pub(crate) struct Break {
 /// A stretch of a segment between two breaks.
 struct Stretch<'a> {
     segment: &'a Segment,
-    /// From where to where, counted from the start of the segment.
+    /// First arc length, from the start of the segment.
     from: f64,
     to: f64,
-    /// The joint that leads to it.
+    /// The joint before the stretch, if any.
     joint: Option<Piece>,
 }
 
 impl Stretch<'_> {
-    /// Elements that it takes where the rigidity changes along it: what bends goes with its inverse.
+    /// Least number of elements that the stretch needs where its rigidity changes along it: bend goes with the inverse of
+    /// rigidity.
     fn fewest(&self) -> usize {
+        /// Elements for each factor e of rigidity along a stretch, a number.
         const PER_FACTOR_E: f64 = 8.0;
         let Segment::Strip(strip) = self.segment else {
             return 1;
@@ -89,7 +91,7 @@ impl Strip {
         }
     }
 
-    /// Integral of the rigidity, exact for one linear between entries.
+    /// Integral of the rigidity, exact for a rigidity linear between entries.
     fn total_rigidity(&self) -> f64 {
         let mut places = vec![0.0, self.length];
         if let Rigidity::Table(table) = &self.rigidity {
@@ -102,7 +104,7 @@ impl Strip {
             .sum()
     }
 
-    /// Whether the fields go on from this strip to another without a jump.
+    /// Whether the fields are continuous from this strip to another.
     fn goes_on_to(&self, next: &Self) -> bool {
         self.geodesic == next.geodesic
             && self.curl == next.curl
@@ -145,7 +147,7 @@ impl Segment {
         }
     }
 
-    /// Arc lengths inside the segment where its rigidity has a kink.
+    /// Arc lengths inside the segment where its rigidity has a corner.
     fn table_entries(&self, same: f64) -> Vec<f64> {
         let Self::Strip(Strip {
             rigidity: Rigidity::Table(table),
@@ -203,15 +205,15 @@ impl Belt {
         self.segments.iter().map(Segment::length).sum()
     }
 
-    /// Mean rigidity over what bends, the scale of energies.
+    /// Mean rigidity over the flexible strips, the scale of energies.
     pub(crate) fn mean_rigidity(&self) -> f64 {
         let strips = || self.segments.iter().filter_map(Segment::strip);
         let length: f64 = strips().map(|strip| strip.length).sum();
         strips().map(Strip::total_rigidity).sum::<f64>() / length
     }
 
-    /// Whether bend and slope go on through the seam of a closed belt, up to the sign that an odd number of half turns
-    /// gives them; the slope does but at a stiffener.
+    /// Whether bend and slope are continuous through the seam of a closed belt, up to the sign that an odd number of half
+    /// turns gives them; the slope is, except at a stiffener.
     pub(crate) fn goes_on_through_seam(&self) -> [bool; 2] {
         let (Some(Segment::Strip(last)), Some(Segment::Strip(first))) =
             (self.segments.last(), self.segments.first())
@@ -238,14 +240,15 @@ impl Belt {
         }
     }
 
-    /// `count` elements shared out by length, a few more where that takes parts of one between two breaks, ends of
-    /// segments or entries of a table of rigidity; lengths in U, rigidity in its mean. A stiffened stretch is one piece.
+    /// The pieces of a mesh of `count` elements, shared out by length. There are more elements where a share is not whole,
+    /// between two breaks, ends of segments or entries of a table of rigidity. A stiffened stretch is one piece. Units:
+    /// lengths in U, rigidity in its mean.
     pub(crate) fn pieces(&self, count: usize, breaks: &[Break]) -> Vec<Piece> {
         let shared = self.pieces_shared(&self.shares(count, breaks), breaks);
         shared.expect("a share for every stretch")
     }
 
-    /// How many elements every stretch gets of a count.
+    /// Number of elements of every stretch, of `count` in all.
     pub(crate) fn shares(&self, count: usize, breaks: &[Break]) -> Vec<usize> {
         let of_length = |stretch: &Stretch| (stretch.to - stretch.from) / self.length();
         let stretches = self.stretches(breaks);
@@ -253,7 +256,8 @@ impl Belt {
         stretches.iter().map(share).collect()
     }
 
-    /// The same with so many elements to every stretch; `None` where there are not as many stretches.
+    /// The pieces of a mesh with given numbers of elements, one a stretch; `None` where the belt has another number of
+    /// stretches.
     pub(crate) fn pieces_shared(&self, shares: &[usize], breaks: &[Break]) -> Option<Vec<Piece>> {
         let (length, rigidity) = (self.length(), self.mean_rigidity());
         let stretches = self.stretches(breaks);
@@ -338,6 +342,7 @@ impl Belt {
 
 /// The share of a count by weight, out of 1, rounded up: no element is longer than if all were alike.
 fn share(count: usize, weight: f64) -> usize {
+    /// Rounding error of a share, in elements: a share above a whole number by less is that number.
     const ROUNDING: f64 = 1e-9;
     let due = weight * count as f64;
     ((due - ROUNDING).ceil() as usize).max(1)

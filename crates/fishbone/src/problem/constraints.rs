@@ -5,11 +5,11 @@ use super::active_set::ActiveSet;
 use super::edges::BoardEdges;
 use crate::problem::program::{BeltPoint, BeltProgram};
 
-/// All kinds of inequalities with an active set.
+/// Kinds of inequalities with an active set, one of each.
 const KINDS: [&dyn ActiveSet; 1] = [&BoardEdges];
 
 impl Problem {
-    /// Whether the active sets of a programme may be others for another shape.
+    /// Whether the active sets of a programme depend on its shape.
     pub(crate) fn has_active_sets(&self, program: &BeltProgram) -> bool {
         KINDS.iter().any(|kind| kind.depends_on_shape(program))
     }

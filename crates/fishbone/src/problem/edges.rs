@@ -1,7 +1,7 @@
 //! The edges of the board as inequalities: the active edges keep ribs apart on the whole board.
 //!
-//! |s| ≤ 2/V keeps them apart between the edges of their own stretch. Where the outline turns inwards, at the inner side of a
-//! bend, steep ribs reach farther; which edge bounds them there depends on the shape.
+//! |s| ≤ 2/V keeps ribs apart between the edges of their own stretch. Where the outline turns inwards, at the inner side of
+//! a bend, steep ribs reach farther; the edge that bounds them there depends on the shape.
 
 use super::active_set::ActiveSet;
 use super::number;
@@ -11,9 +11,9 @@ use crate::strip::bounds::{ACTIVE, ActiveEdges, Edge};
 use crate::strip::element::Element;
 use crate::strip::spine::Spine;
 
-/// Slack at an edge below which it holds ribs, of 1 − s v.
+/// Slack 1 − s v at an edge below which the edge holds ribs, dimensionless.
 const TOUCHING: f64 = 1e-4;
-/// Difference of slacks, of 1 − s v, below which two edges are one.
+/// Difference of slacks 1 − s v below which two edges are the same, dimensionless.
 const SAME: f64 = 1e-3;
 
 /// The edges of the board.
@@ -45,8 +45,8 @@ impl ActiveSet for BoardEdges {
     }
 }
 
-/// The first element of which ribs are held by an active edge that they no longer reach: chosen for another shape, it would
-/// bound this one for nothing.
+/// The first element with ribs held by an active edge that they do not reach: an edge chosen for another shape would bound
+/// this shape without cause.
 fn held_from_afar(program: &BeltProgram, shape: &Spine) -> Option<usize> {
     let is_bounded = |(k, _): (usize, &Element)| program.edges[k] != [None; ACTIVE];
     if !program.elements().any(is_bounded) {

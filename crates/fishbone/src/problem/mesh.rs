@@ -1,20 +1,20 @@
-//! A mesh that stays the same while the numbers of a problem change.
+//! A mesh that stays the same while the data of a problem change.
 
 use super::Problem;
 use crate::problem::program::{BeltProgram, Piece};
 use crate::strip::bounds::ActiveEdges;
 
-/// The mesh of a solution, and the edges that bound its ribs: what stays the same while the solution is continued.
+/// The mesh of a solution and its active edges, which stay the same while the solution is continued.
 #[derive(Debug, Clone)]
 pub(crate) struct Mesh {
     /// Number of elements of every stretch of the belt.
     shares: Vec<usize>,
-    /// Of every piece whether it is a strip, and the active edges.
+    /// Whether each piece is a strip, and its active edges.
     pieces: Vec<(bool, ActiveEdges)>,
 }
 
 impl Mesh {
-    /// That of a programme of a problem.
+    /// The mesh of a programme of a problem.
     pub(crate) fn of(problem: &Problem, program: &BeltProgram) -> Self {
         let pieces = program.pieces.iter().map(is_strip);
         Self {
@@ -25,7 +25,7 @@ impl Mesh {
 }
 
 impl Problem {
-    /// The programme on a mesh; `None` where the belt has other stretches than those that were meshed.
+    /// The programme on a mesh; `None` where the belt has other stretches than the mesh.
     pub(crate) fn program_on(&self, mesh: &Mesh) -> Option<BeltProgram> {
         let mut program = self.program_shared(&mesh.shares)?;
         let pieces = program.pieces.iter().map(is_strip);

@@ -1,6 +1,6 @@
-//! The scenario schema: what is to be solved, as it stands in a TOML or JSON file. The room `io` reads and writes these.
+//! The scenario schema: the belt problem as it stands in a TOML or JSON file. The room `io` reads and writes scenarios.
 //!
-//! Any consistent set of units serves; SI is assumed in the words below. Angles are in radians.
+//! Any consistent set of units serves; the comments assume SI. Angles are in radians.
 
 pub mod error;
 mod schema;
@@ -17,15 +17,15 @@ pub use schema::{
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
-/// Two places along the spine closer than this, relative to the length of the belt, are one place: sums of decimal
-/// lengths are not exact.
+/// Distance along the spine below which two places are one, as a share of the belt's length: sums of decimal lengths are not
+/// exact.
 pub(crate) const SAME_PLACE: f64 = 1e-9;
 
-/// Poisson's ratio of a belt that names none.
+/// Poisson's ratio of a belt that gives none, dimensionless.
 pub(crate) const DEFAULT_POISSON: f64 = 0.3;
 
 impl Scenario {
-    /// A belt that nothing else is said of: a file with the one table `belt`.
+    /// The scenario of a belt alone: a file with the one table `belt`.
     pub fn new(belt: BeltSpec) -> Self {
         Self {
             name: String::new(),
@@ -47,7 +47,7 @@ impl Scenario {
             .unwrap_or_else(|| self.default_elements())
     }
 
-    /// Whether the rib at a support is square: as the support says, else at a clamped end; a closed belt has no ends.
+    /// Whether the rib at a support is square: as the support states, else at a clamped end; a closed belt has no ends.
     pub(crate) fn is_square_rib(&self, support: &SupportSpec) -> bool {
         let clamped_end = !self.belt.closed && support.is_square_rib(self.belt.length());
         support.square_rib.unwrap_or(clamped_end)
@@ -175,7 +175,7 @@ impl BeltSpec {
         self.segments.iter().all(straight)
     }
 
-    /// Bend ω_ζ of an unloaded segment: its own, else the belt's; 0 of one that does not bend. Units: rad/m.
+    /// Bend ω_ζ of an unloaded segment: its own, else the belt's; 0 of a segment that is not flexible. Units: rad/m.
     pub(crate) fn natural_bend_of(&self, segment: &SegmentSpec) -> f64 {
         match segment.is_flexible() {
             true => segment.natural_bend().unwrap_or(self.natural_bend),
@@ -320,7 +320,7 @@ impl Place {
 }
 
 impl SupportSpec {
-    /// A support at a place, which is still to be told what it holds.
+    /// A support at a place that as yet holds nothing.
     pub fn new(at: Place) -> Self {
         Self {
             at,

@@ -4,20 +4,21 @@ use crate::strip::ribs::{Scaled, SlopeJet, Strips, variables};
 use nalgebra::Vector2;
 use num_dual::DualNum;
 
-/// Active edges of an element, the largest number.
+/// Greatest count of active edges of an element, a number.
 pub(crate) const ACTIVE: usize = 3;
-/// Inequalities of an element, the largest number: those at the edges of its own stretch, then those at active edges.
+/// Greatest count of inequalities of an element, a number: two at the edges of its own stretch, then one at each active
+/// edge.
 pub(crate) const BOUNDS: usize = 2 + ACTIVE;
 
-/// The edges of the board that bound the ribs of an element besides those of its own stretch.
+/// The active edges of an element: edges of the board, other than its own stretch's two, that bound its ribs.
 pub(crate) type ActiveEdges<W = f64> = [Option<Edge<W>>; ACTIVE];
 
 /// A line or an arc of the board's outline as seen from the foot of a rib, by the tangent nearest to the foot.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Edge<W = f64> {
-    /// Direction of that tangent along and across the spine at the foot, (cos δ, sin δ).
+    /// Direction of the nearest tangent along and across the spine at the foot, (cos δ, sin δ).
     pub direction: Vector2<f64>,
-    /// Its distance c from the foot, negative on the −ζ side.
+    /// Distance c of the nearest tangent from the foot, negative on the −ζ side.
     pub distance: W,
     /// Curvature, 0 of a line; towards the side on which the edge lies.
     pub curvature: W,
@@ -47,7 +48,7 @@ impl Edge {
 }
 
 impl<W: DualNum<Primitive = f64> + Copy> Edge<W> {
-    /// How far ribs are from crossing before they reach the edge: the least of `cos δ + β sin δ − s c` over its tangents.
+    /// Slack of ribs against crossing before they reach the edge: the least of `cos δ + β sin δ − s c` over its tangents.
     ///
     /// A rib meets a tangent at v = c/(cos δ + β sin δ), so this is 1 − s v in other words; but it counts a rib so
     /// steep that it passes the edge by as crossing others.
@@ -57,7 +58,7 @@ impl<W: DualNum<Primitive = f64> + Copy> Edge<W> {
         if self.curvature.re() == 0.0 {
             return nearest;
         }
-        // Over the tangents it is a sine of their turn.
+        // Over the tangents of an arc the slack is a sine of their turn.
         let quarter = slope * along - across;
         let (k, side) = (self.curvature, self.curvature.re().signum());
         let beyond = s - nearest * k;
@@ -90,8 +91,9 @@ pub(crate) struct RibBounds<'a, W = f64> {
 }
 
 impl<'a, W: DualNum<Primitive = f64> + Copy> RibBounds<'a, W> {
-    /// How far the ribs are from crossing on the board, by slopes at both ends of the element; admissible where positive:
-    /// `1 − s v` at the +ζ and at the −ζ edge of the stretch, then [`Edge::slack`] at the active edges, 1 where there are none.
+    /// Slacks of the ribs against crossing on the board, by slopes at both ends of the element; admissible where positive:
+    /// `1 − s v` at the +ζ and at the −ζ edge of the stretch, then [`Edge::slack`] at the active edges, 1 where there are
+    /// none.
     ///
     /// On an arc v is where the rib meets the inner edge; towards the outer one, which a rib meets before V/2, it is V/2
     /// all the same, so that |s| ≤ 2/V holds everywhere.
@@ -115,7 +117,7 @@ impl<'a, W: DualNum<Primitive = f64> + Copy> RibBounds<'a, W> {
         [-s * plus + 1.0, -s * minus + 1.0, a, b, c]
     }
 
-    /// The places among [`Self::slacks`] of the inequalities that there are.
+    /// Indices in [`Self::slacks`] of the element's inequalities.
     pub(crate) fn places(&self) -> impl Iterator<Item = usize> + use<W> {
         let active = self.edges.each_ref().map(Option::is_some);
         (0..BOUNDS).filter(move |place| *place < 2 || active[place - 2])
@@ -159,7 +161,7 @@ mod tests {
         }
     }
 
-    /// Pairs of slopes from which the ribs do not cross.
+    /// Slopes at both ends of elements whose ribs do not cross, dimensionless.
     const SLOPES: [[f64; 2]; 4] = [[0.0, 0.0], [0.3, 0.3 + 1e-9], [0.9, 1.02], [0.05, -0.05]];
 
     #[test]
@@ -192,7 +194,7 @@ mod tests {
 
     #[test]
     fn test_slack_at_an_edge_is_the_least_over_its_tangents() {
-        // By the points of the arc and their tangents, from a centre and a radius.
+        // The expected slack comes from the arc's points and their tangents, by its centre and radius.
         for (curvature, nearest, distance) in [(4.0f64, 0.3f64, 0.05f64), (-9.0, -0.8, -0.03)] {
             let edge = Edge {
                 direction: Vector2::new(nearest.cos(), nearest.sin()),

@@ -22,12 +22,12 @@ named! {
     }
 }
 
-/// The bend that a belt has of itself.
+/// The natural bend of a belt, with its Poisson's ratio.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Curl<W = f64> {
     /// Natural bend k, the ω_ζ of the unloaded belt.
     pub bend: W,
-    /// Poisson's ratio ν, which says what bending along the curl does across it.
+    /// Poisson's ratio ν: bending along the curl bends the plate across it by ν as much.
     pub poisson: f64,
 }
 
@@ -43,16 +43,16 @@ pub(crate) struct Term {
 }
 
 impl EnergyModel {
-    /// Whether the density depends on what the board is like across the spine.
+    /// Whether the density depends on the width of the board.
     pub(crate) fn knows_width(self) -> bool {
         self == Self::Wunderlich
     }
 
     /// Energy per unit length at unit rigidity; the numbers may carry derivatives.
     ///
-    /// With the natural bend k it is that of a plate whose unloaded state is a cylinder: the bracket
-    /// κ₁² − 2k ω_ζ (1 + ν β²) + k², each term times what the width makes of it. The source's model has no plate behind
-    /// it and takes the bracket times sqrt(1+β²).
+    /// With the natural bend k the energy is that of a plate whose unloaded state is a cylinder: the bracket
+    /// κ₁² − 2k ω_ζ (1 + ν β²) + k², each term times its factor of the width, [`Across`]. The source's model has no plate
+    /// behind it and takes the bracket times sqrt(1+β²).
     ///
     /// Source: Eq. (29), (34), in β: written in ω_η/ω_ζ it is singular where the belt is not bent.
     pub(crate) fn value<W: DualNum<Primitive = f64> + Copy, D: Scaled<W>>(
@@ -176,6 +176,7 @@ mod tests {
     use super::*;
     use num_dual::{Dual2SVec64, hessian};
 
+    /// Energy models, one of each.
     const MODELS: [EnergyModel; 3] = [
         EnergyModel::Fishbone,
         EnergyModel::Sadowsky,

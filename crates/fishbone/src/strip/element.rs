@@ -42,7 +42,7 @@ pub struct Element {
     pub rigidity: [f64; 2],
     /// Half the width, V/2.
     pub half_width: f64,
-    /// What the element is bent to when nothing acts on it.
+    /// Natural bend of the element.
     pub curl: Curl,
 }
 
@@ -174,7 +174,7 @@ impl Element {
         at(0) + at(1)
     }
 
-    /// What the width makes of the terms of the energy, with derivatives.
+    /// Factors of the width in the terms of the energy, with derivatives.
     pub(crate) fn across_jets(
         &self,
         model: EnergyModel,
@@ -230,7 +230,7 @@ mod tests {
     use nalgebra::{Matrix3, SMatrix, SVector, Vector2};
     use num_dual::{DualNum, hessian};
 
-    /// The element over again in any scalar: truncated exponential series instead of closed forms.
+    /// Displacement and rotation along the element in any scalar, by truncated exponential series instead of closed forms.
     fn displacement_and_rotation<D: DualNum<Primitive = f64> + Copy>(
         h: f64,
         geodesic: f64,
@@ -381,6 +381,7 @@ mod tests {
         assert!((a - b).amax() <= tolerance * scale, "{a}{b}");
     }
 
+    /// Energy models, one of each.
     const MODELS: [EnergyModel; 3] = [
         EnergyModel::Fishbone,
         EnergyModel::Sadowsky,

@@ -1,9 +1,9 @@
 //! Derivatives of elements, several at a time: the same arithmetic in every lane of a vector.
 //!
 //! A motion M(w) by the four unknowns w has the derivatives of the twist X in `M(w + dw) = exp(X) M(w)`. Seen from the
-//! world, about its origin, the twists of elements that follow each other add up: to first order as they are, to second
-//! order with half their bracket. What acts on the belt beyond is one wrench about the origin, the same for all elements
-//! between two points where something acts.
+//! world, about its origin, the twists of elements that follow each other add up: to first order plainly, to second order
+//! with half their bracket. The loads and supports beyond an element make one wrench about the origin, the same for all
+//! elements between two points where loads or supports act.
 
 mod arithmetic;
 mod lane;
@@ -24,7 +24,7 @@ type Triple = [f64; 3];
 /// The upper triangle of a symmetric 4×4 matrix by rows.
 type Upper = [f64; 10];
 
-/// What the motions along a block of elements depend on.
+/// The data that the motions along a block of elements depend on.
 #[derive(Debug, Clone)]
 struct Spans {
     /// bend₀, slope₀, bend₁, slope₁.
@@ -33,12 +33,12 @@ struct Spans {
     geodesic: Lanes,
 }
 
-/// What the derivatives of a block of elements depend on.
+/// The data that the derivatives of a block of elements depend on.
 #[derive(Debug, Clone)]
 struct Input {
     spans: Spans,
     rigidity: [Lanes; 2],
-    /// What the width makes of the energy: value, gradient and Hessian (upper triangle) by slope₀ and slope₁.
+    /// Factor of the width in the energy: value, gradient and Hessian (upper triangle) by slope₀ and slope₁.
     across: [Lanes; 6],
     /// Frame of the first node, column by column.
     frame: [Lanes; 9],
@@ -59,23 +59,24 @@ struct Output {
     mixed: [[Lanes; 6]; 4],
     /// Gradient of bending energy and work.
     gradient: [Lanes; 4],
-    /// Their Hessian, upper triangle by rows.
+    /// Hessian of bending energy and work, upper triangle by rows.
     hessian: [Lanes; 10],
 }
 
-/// A block of elements, their derivatives once they have been found.
+/// A block of elements with their derivatives, valid once `find` has run.
 #[derive(Debug, Clone)]
 pub struct Block {
     input: Input,
     output: Output,
-    /// What the natural bend adds, where an element has one.
+    /// Energy that the natural bend adds, with its derivatives, where an element has a natural bend.
     curl: [Option<Jet>; LANES],
 }
 
+/// Zero in every lane, in the unit of its field.
 const NOTHING: Lanes = [0.0; LANES];
 
 impl Spans {
-    /// Elements of no length, which do no harm where a block is not full.
+    /// Spans of no length, lengths in the solver's U: they fill the lanes of a block that is not full.
     const NONE: Self = Self {
         fields: [NOTHING; 4],
         length: NOTHING,
@@ -100,7 +101,7 @@ pub struct Motions {
 }
 
 impl Default for Motions {
-    /// Those along elements of no length.
+    /// Motions along elements of no length.
     fn default() -> Self {
         Self {
             spans: Spans::NONE,
@@ -298,7 +299,7 @@ impl Even {
             *square = dot(rotation, rotation);
             even.put(lane, &Coefficients::near(*square));
         }
-        // Asked in a loop of its own: a loop that carries something from lane to lane is not vectorised.
+        // The test has its own loop: a loop that carries a value from lane to lane is not vectorised.
         let mut is_wide = false;
         for square in square {
             is_wide |= square > 1.0;
@@ -318,7 +319,7 @@ impl Even {
         }
     }
 
-    /// The same where rotations are too wide for the series.
+    /// The even functions of lanes whose rotations are too wide for the series.
     #[cold]
     #[inline(never)]
     fn put_exact(&mut self, spans: &Spans) {

@@ -1,4 +1,4 @@
-//! The strip of the board between two neighbouring ribs: where its ribs end, when they cross, what its width adds.
+//! The strip of the board between two neighbouring ribs: the ends of its ribs, their crossing, the factors of its width.
 //!
 //! A strip is known by the rib slope β and by s = β' + κ_g (1+β²): at v it is `1 − v s` times as wide as on the spine.
 
@@ -6,7 +6,7 @@ use nalgebra::{Matrix2, Vector2};
 use num_dual::{Derivative, Dual2SVec64, DualNum};
 use std::ops::{Div, Mul};
 
-/// How fast neighbouring ribs converge towards +v: s = β' + κ_g (1 + β²).
+/// Rib convergence, the rate at which neighbouring ribs close in towards +v: s = β' + κ_g (1 + β²).
 ///
 /// The strip between two ribs is (1 − v s) du wide at v, so ribs meet at v = 1/s. For κ_g = 0 it is the β' of the source.
 ///
@@ -22,7 +22,8 @@ pub(crate) fn rib_convergence_bound(width: f64) -> f64 {
     2.0 / width
 }
 
-/// A number, it may be with derivatives, that numbers of another kind may multiply: the width is mostly a plain one.
+/// A number, with or without derivatives, that a number `W` of another type multiplies: the width is a plain number unless
+/// it is differentiated by.
 pub(crate) trait Scaled<W>:
     DualNum<Primitive = f64> + Copy + Mul<W, Output = Self> + Div<W, Output = Self>
 {
@@ -33,20 +34,19 @@ impl<W, D> Scaled<W> for D where
 {
 }
 
-/// What the density's terms are multiplied by to hold for the whole width: integrals over v from the rib's one end v₋ to
-/// the other v₊, divided by V.
+/// Factors of the width in the density's terms: integrals over v from the rib's one end v₋ to the other v₊, divided by V.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Across<T> {
-    /// ∫ dv / (1 − v s), of the squared curvature.
+    /// ∫ dv / (1 − v s), the factor of the squared curvature.
     pub bending: T,
-    /// ∫ dv, of the curvature.
+    /// ∫ dv, the factor of the curvature.
     pub length: T,
-    /// ∫ (1 − v s) dv, of what does not depend on the curvature.
+    /// ∫ (1 − v s) dv, the factor of the terms without curvature.
     pub area: T,
 }
 
 impl Across<f64> {
-    /// The narrow limit, and every straight belt whose ribs are parallel.
+    /// Factors of the width in the narrow limit, and in every straight belt whose ribs are parallel, dimensionless.
     pub(crate) const PLAIN: Self = Self {
         bending: 1.0,
         length: 1.0,
@@ -55,7 +55,7 @@ impl Across<f64> {
 }
 
 impl<D: DualNum<Primitive = f64> + Copy> Across<D> {
-    /// Of a straight belt, by y = sV/2.
+    /// Factors of the width of a straight belt, by y = sV/2.
     pub(crate) fn straight(y: D) -> Self {
         Self {
             bending: artanh_ratio(y),
@@ -65,7 +65,7 @@ impl<D: DualNum<Primitive = f64> + Copy> Across<D> {
 }
 
 impl<T: Copy> Across<T> {
-    /// The same in another kind of number.
+    /// The factors in another type of number.
     pub(crate) fn map<U>(&self, f: impl Fn(T) -> U) -> Across<U> {
         Across {
             bending: f(self.bending),
@@ -75,7 +75,7 @@ impl<T: Copy> Across<T> {
     }
 }
 
-/// A function of the rib slopes at both ends of an element, with its derivatives by them.
+/// A function of the rib slopes at both ends of an element, with its derivatives by these slopes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SlopeJet {
     /// Value.
@@ -96,7 +96,7 @@ impl SlopeJet {
         }
     }
 
-    /// A function of s·V/2 = `rate` (β₁ − β₀), from its derivatives by that.
+    /// A function of s·V/2 = `rate` (β₁ − β₀), from its value and derivatives by s·V/2.
     pub(super) fn of_share(rate: f64, [value, first, second]: [f64; 3]) -> Self {
         let by = Vector2::new(-rate, rate);
         Self {
@@ -133,7 +133,8 @@ pub(crate) struct Strips<W = f64> {
     pub length: f64,
 }
 
-/// An inner edge tighter than this, in V/2, counts as this tight: the true one is trimmed.
+/// Greatest curvature of an arc with which its inner edge is computed, in 2/V: the true inner edge of a tighter arc is
+/// trimmed.
 const TIGHTEST: f64 = 0.9;
 
 impl<W: DualNum<Primitive = f64> + Copy> Strips<W> {
@@ -146,7 +147,7 @@ impl<W: DualNum<Primitive = f64> + Copy> Strips<W> {
         (mean, rise + (mean * mean + 1.0) * self.geodesic)
     }
 
-    /// Where the rib of this slope meets the edges, v₋ and v₊: `v − κ_g v² (1+β²)/2 = ±V/2 − κ_g V²/8`.
+    /// Ends v₋ and v₊ of the rib of a slope, on the edges: `v − κ_g v² (1+β²)/2 = ±V/2 − κ_g V²/8`.
     ///
     /// A rib so steep that it misses the inner edge of its own arc leaves the board farther along; there the root is
     /// continued smoothly.
@@ -165,7 +166,7 @@ impl<W: DualNum<Primitive = f64> + Copy> Strips<W> {
         })
     }
 
-    /// What the width makes of the density's terms, by slopes at both ends of the element.
+    /// Factors of the width in the density's terms, by slopes at both ends of the element.
     pub(crate) fn across<D: Scaled<W>>(&self, slopes: [D; 2]) -> Across<D> {
         let (mean, s) = self.middle(slopes);
         let [minus, plus] = self.ends(mean);
@@ -181,7 +182,7 @@ impl<W: DualNum<Primitive = f64> + Copy> Strips<W> {
 }
 
 impl Strips {
-    /// What the width makes of the density's terms, with derivatives.
+    /// Factors of the width in the density's terms, with derivatives.
     pub(crate) fn across_jets(&self, slopes: [f64; 2]) -> Across<SlopeJet> {
         if self.geodesic == 0.0 {
             let rate = self.half_width / self.length;
@@ -195,7 +196,7 @@ impl Strips {
     }
 }
 
-/// Two numbers that carry their first and second derivatives along.
+/// Two variables as numbers that carry first and second derivatives.
 pub(super) fn variables(at: [f64; 2]) -> [Dual2SVec64<2>; 2] {
     let [mut first, mut second] = at.map(Dual2SVec64::from);
     first.v1 = Derivative::derivative_generic(nalgebra::Const::<1>, nalgebra::Const::<2>, 0);
@@ -203,8 +204,10 @@ pub(super) fn variables(at: [f64; 2]) -> [Dual2SVec64<2>; 2] {
     [first, second]
 }
 
-/// √t, continued below a small t, two derivatives and all, by what stays positive: a square root would end at 0.
+/// √t, continued below a small t by a positive function with the same value and first two derivatives: a square root would
+/// end at 0.
 fn continued_root<D: DualNum<Primitive = f64> + Copy>(t: D) -> D {
+    /// Argument t below which the square root is continued, dimensionless.
     const SMALL: f64 = 0.01;
     if t >= SMALL {
         return t.sqrt();
@@ -213,8 +216,9 @@ fn continued_root<D: DualNum<Primitive = f64> + Copy>(t: D) -> D {
     (below * 0.5 - below * below * 0.25).exp() * SMALL.sqrt()
 }
 
-/// Below this y² the closed form of artanh(y)/y cancels, and the series Σ y²ⁿ/(2n+1) is exact in [`TERMS`] terms.
+/// Square y² below which artanh(y)/y comes from the series Σ y²ⁿ/(2n+1), dimensionless: its closed form cancels there.
 const SERIES_BELOW: f64 = 0.04;
+/// Terms of the series of artanh(y)/y, a number: exact in double precision below [`SERIES_BELOW`].
 const TERMS: i32 = 14;
 
 /// artanh(y)/y.
@@ -240,7 +244,7 @@ fn artanh_ratio_with_derivatives(y: f64) -> [f64; 3] {
     [g, g1, g2]
 }
 
-/// The same from the series.
+/// artanh(y)/y and its first two derivatives, from the series.
 fn artanh_ratio_series(y: f64) -> [f64; 3] {
     let square = y * y;
     let (mut g1, mut g2) = (0.0, 0.0);
@@ -265,7 +269,7 @@ mod tests {
         }
     }
 
-    /// Pairs of slopes from which the ribs do not cross.
+    /// Slopes at both ends of elements whose ribs do not cross, dimensionless.
     const SLOPES: [[f64; 2]; 5] = [
         [0.0, 0.0],
         [0.3, 0.3 + 1e-9],
@@ -374,7 +378,7 @@ mod tests {
     }
 
     #[test]
-    fn test_continued_root_has_no_kink() {
+    fn test_continued_root_has_no_corner() {
         let h = 1e-4;
         let root = |t: f64| continued_root(t);
         let second = |t: f64| (root(t + h) - 2.0 * root(t) + root(t - h)) / (h * h);

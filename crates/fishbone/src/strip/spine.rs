@@ -1,11 +1,11 @@
-//! The solved centre line with its ribs: what the surface and every report are drawn from.
+//! The solved centre line with its ribs, from which the surface and every report are drawn.
 
 use crate::geometry::{Pose, exp};
 use crate::strip::element::{increment, torsion};
 use crate::strip::ribs::rib_convergence;
 use nalgebra::{Vector3, Vector4};
 
-/// What joins a node of the spine to the next one.
+/// The piece of the belt between a node of the spine and the next.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Piece {
     /// A flexible stretch.
@@ -45,7 +45,7 @@ impl Piece {
 pub struct Spine {
     /// Width V of the belt.
     pub width: f64,
-    /// What joins each node to the next. Shapes: one fewer than there are nodes.
+    /// The piece from each node to the next. Shapes: one fewer than there are nodes.
     pub pieces: Vec<Piece>,
     /// Signed half turns after which the end of a closed belt joins its start; `None` of an open belt.
     pub half_turns: Option<i32>,
@@ -105,7 +105,7 @@ impl Spine {
         spine
     }
 
-    /// The same of a straight belt, whose fields may jump where a node is repeated.
+    /// The open straight spine of given fields at the nodes; the fields may jump where a node is repeated.
     ///
     /// # Panics
     ///

@@ -1,10 +1,11 @@
-//! How much a search for all equilibria does, and what it takes for the same.
+//! Settings of the search for all equilibria: its extent, and its tolerances for equal equilibria.
 
 use super::height;
 use crate::analysis::symmetry::{SAME, are_images};
 use crate::equilibrium::Equilibrium;
 
-/// What the search does, and what it takes for the same; by default what finds all that is known to be there.
+/// Extent of the search and its tolerances for equal equilibria; with the defaults it finds all that are known of the
+/// scenarios tried.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SearchSettings {
     /// Waves of bend, laid over every arch and the straight belt; amplitudes in 1/U.
@@ -13,21 +14,22 @@ pub struct SearchSettings {
     pub slope_waves: Vec<Wave>,
     /// Sums of waves from which the search starts as well, a number.
     pub sums: usize,
-    /// Minima that are perturbed, the largest number.
+    /// Greatest count of perturbed minima, a number.
     pub perturbed: usize,
     /// Modes along which a minimum is perturbed, a number.
     pub perturbed_modes: usize,
-    /// Displacements of a minimum along each of these, in norms of the mode.
+    /// Displacements of a minimum along each of these modes, in norms of the mode.
     pub perturbations: Vec<f64>,
-    /// Equilibria that are continued in modal loads, the largest number.
+    /// Greatest count of equilibria continued in modal loads, a number.
     pub continued: usize,
-    /// Equilibria continued at a time, so that lower ones that are found meanwhile come first; a number.
+    /// Equilibria continued at a time, a number: lower ones that are found meanwhile come first.
     pub at_a_time: usize,
-    /// Modes along which an equilibrium is loaded, by its number of negative modes; one of more is not reported; a number each.
+    /// Modes along which an equilibrium is loaded, a number for each count of negative modes; equilibria with more negative
+    /// modes are not reported.
     pub loaded_modes: [usize; 3],
     /// Displacement from a saddle along its lowest mode, from where it is downhill, in norms of the mode.
     pub off_saddle: f64,
-    /// Elements of the mesh that confirms an equilibrium, in those of the scenario.
+    /// Elements of the mesh that confirms an equilibrium, as a multiple of the scenario's.
     pub refinement: usize,
     /// Difference of energy up to which two equilibria on one mesh may be the same, a share.
     pub same_level: f64,
@@ -50,7 +52,7 @@ pub struct SearchSettings {
 pub struct Wave {
     /// Half waves over the length of the belt, a number.
     pub half_waves: f64,
-    /// Largest value, in the unit of what waves.
+    /// Largest value, in the unit of the field.
     pub amplitude: f64,
 }
 
@@ -97,7 +99,7 @@ impl Default for SearchSettings {
 }
 
 impl SearchSettings {
-    /// Most negative modes of an equilibrium that is reported.
+    /// Greatest number of negative modes of a reported equilibrium.
     pub(super) fn highest_index(&self) -> usize {
         self.loaded_modes.len() - 1
     }
@@ -130,14 +132,14 @@ impl SearchSettings {
                 .is_some_and(|(a, b)| are_images(&a.at.point.poses, &b.at.point.poses, distance))
     }
 
-    /// What differences of energy are measured by: that of bending, as the zero of a load's potential is anywhere; of a flat
-    /// belt next to nothing.
+    /// Scale of differences of energy: the bending energy, because the zero of a load's potential is arbitrary; of a flat
+    /// belt `flat_energy`.
     pub(super) fn size(&self, equilibrium: &Equilibrium) -> f64 {
         let unit = equilibrium.problem.units().energy;
         equilibrium.elastic_energy.max(self.flat_energy * unit)
     }
 
-    /// Whether one of two mirror images bulges more as the scenario asks.
+    /// Whether the first of two mirror images bulges more along `solver.bulge`.
     pub(super) fn is_higher(&self, one: &Equilibrium, other: &Equilibrium) -> bool {
         height(one) > height(other) + self.higher * one.spine.length()
     }

@@ -1,4 +1,4 @@
-//! The search for a diagram: a branch is traced, and those that cross it at its events.
+//! The search for a diagram: a branch is traced, then the branches that cross it at its events.
 
 use super::{Branch, CrossingSettings, Diagram, End, Event, Kind, Origin, Snapped, State};
 use crate::analysis::family::{Along, Station};
@@ -13,7 +13,7 @@ type Crossing = stagewise::Event<BeltPoint, 8>;
 /// A curve of equilibria that may have been interrupted.
 type Curve = stagewise::Curve<BeltPoint, (), 8>;
 
-/// Traces a branch from a station, and those that branch off it, into a diagram that is empty.
+/// Traces a branch from a station, and the branches off it, into an empty diagram.
 pub(super) fn run(
     family: &Along,
     continuation: Continuation<'_, Along, 6, 2, 8>,
@@ -40,7 +40,7 @@ struct Search<'a, 'b> {
 }
 
 impl Search<'_, '_> {
-    /// Traces a branch, then those that branch off it.
+    /// Traces a branch, then the branches off it.
     fn trace(&mut self, origin: Option<Origin>, start: Station) {
         let index = self.diagram.branches.len();
         let curve = self
@@ -98,7 +98,7 @@ impl Search<'_, '_> {
         }
     }
 
-    /// A curve as far as the ribs are bounded by the edges that they reach, and by no others.
+    /// A curve up to the first station for which the active edges are wrong, with the reason of its end.
     fn settled(&self, mut curve: Curve) -> (Curve, End) {
         let mut end = End::from(curve.end);
         let is_unsettled = |station: &Station| !self.family.holds(station);
@@ -110,7 +110,7 @@ impl Search<'_, '_> {
         let reached = curve.stations.last().map(|station| station.parameter);
         let is_open = matches!(end, End::Event | End::Lost);
         if is_open && reached.is_some_and(|place| self.family.is_near_limit(place)) {
-            // Through the flat belt it would go over into its mirror image.
+            // Through the flat belt the branch would go over into its mirror image.
             curve.events.retain(|(_, event)| event.turn != Turn::Apex);
             end = End::Taut;
         }
@@ -119,12 +119,12 @@ impl Search<'_, '_> {
 
     /// The stations of other branches that cross at an event, a little before it or beyond.
     ///
-    /// From beside the event a load along the mode that is about to vanish leads over to them.
+    /// From beside the event a load along the vanishing mode leads over to these branches.
     fn crossing(&mut self, event: &Crossing, before: &[Station]) -> Vec<Station> {
         let settings = self.diagram.settings.crossings;
         match event.turn {
             Turn::Fold => return Vec::new(),
-            // A modal load off the branch, where it has not come close yet, leads to the branch that it crosses.
+            // A modal load leads to the crossing branch from a station at some distance from the event.
             Turn::Apex => {
                 let mut found = settings.before.into_iter().map(|far| {
                     let before = before_by(far, event, before);
@@ -178,8 +178,8 @@ impl Search<'_, '_> {
         Some([beyond(true), beyond(false)])
     }
 
-    /// Which ways to follow a branch from a station beside an event: away from where it crosses, or both where it is the one
-    /// that goes straight through.
+    /// Directions in which to follow a branch from a station beside an event, as whether the parameter grows: away from the
+    /// crossing; both ways at an apex, where the other branch goes straight through.
     fn ways(&self, event: &Crossing, side: &Station) -> Vec<bool> {
         let away = side.parameter > event.parameter;
         match event.turn {
@@ -197,7 +197,7 @@ impl Search<'_, '_> {
         })
     }
 
-    /// Of two that are mirror images the one that bulges as the scenario asks; else all.
+    /// The stations without duplicates: of two mirror images only the one that bulges more along `solver.bulge` is kept.
     fn different(&self, stations: Vec<Station>) -> Vec<Station> {
         let bulge = self.diagram.path.base().bulge();
         let reach = |station: &Station| {
@@ -219,7 +219,7 @@ impl Search<'_, '_> {
         different
     }
 
-    /// Where the belt goes that is led on past an event.
+    /// The minimum to which a belt led on past an event snaps.
     fn snapped(&mut self, event: &Crossing, crossing: &[Station], onwards: f64) -> Option<Snapped> {
         let place = event.parameter + self.diagram.settings.crossings.past * onwards;
         let beyond = |station: &&Station| {
@@ -237,7 +237,7 @@ impl Search<'_, '_> {
     }
 }
 
-/// The last station at least so far before an event, else the first.
+/// The last station at a distance of at least `far` before an event, else the first.
 fn before_by<'a>(far: f64, event: &Crossing, stations: &'a [Station]) -> &'a Station {
     let is_before = |station: &&Station| (station.parameter - event.parameter).abs() >= far;
     stations
@@ -247,7 +247,7 @@ fn before_by<'a>(far: f64, event: &Crossing, stations: &'a [Station]) -> &'a Sta
         .unwrap_or(&stations[0])
 }
 
-/// What an event is, by where the other branches are.
+/// The kind of an event, by the places of the crossing branches.
 fn kind(event: &Crossing, crossing: &[Station]) -> Kind {
     let beyond = |station: &&Station| station.parameter > event.parameter;
     match (event.turn, crossing.iter().filter(beyond).count()) {

@@ -1,4 +1,4 @@
-//! What an element is made of, and how its energy and its bounds depend on that.
+//! The data of an element, and the derivatives of its energy and its bounds by them.
 
 use crate::geometry::gauss_points;
 use crate::strip::bounds::{ActiveEdges, Edge, RibBounds};
@@ -8,25 +8,26 @@ use crate::strip::ribs::{Across, Strips};
 use nalgebra::{Matrix4, SVector, Vector2, Vector4};
 use num_dual::{DualNum, HyperDualSVec64, partial_hessian};
 
-/// Of an element: R_f at its two Gauss points, its natural bend, and half its width.
+/// Data of an element: R_f at its two Gauss points, its natural bend, and half its width.
 pub(super) type Data = Vector4<f64>;
-/// Places in [`Data`].
+/// Place of the natural bend in [`Data`], an index.
 pub(super) const NATURAL_BEND: usize = 2;
+/// Place of the half width in [`Data`], an index.
 pub(super) const HALF_WIDTH: usize = 3;
 
 /// Derivatives of an element's part of the Lagrangian by its data.
 #[derive(Debug, Clone)]
 pub(super) struct ByData {
-    /// First ones.
+    /// First derivatives.
     pub(super) first: Data,
-    /// Second ones, by the four unknowns and by the data.
+    /// Second derivatives, by the four unknowns and by the data.
     pub(super) mixed: Matrix4<f64>,
     /// Derivatives of the slacks by half the width.
     pub(super) slacks: Vec<f64>,
 }
 
 impl ByData {
-    /// At some fields, with the multipliers of the inequalities.
+    /// The derivatives at given fields and multipliers of the inequalities.
     pub(super) fn at(
         element: &Element,
         bounds: &RibBounds,
@@ -74,7 +75,7 @@ impl ByData {
     }
 }
 
-/// The energy of an element made of other data.
+/// The energy of an element with other data.
 fn energy<D: DualNum<Primitive = f64> + Copy>(
     element: &Element,
     model: EnergyModel,
@@ -112,7 +113,7 @@ fn strips<D>(element: &Element, half_width: D) -> Strips<D> {
     }
 }
 
-/// The active edges of a board of which half the width is more.
+/// The active edges of a board of a larger half width.
 ///
 /// The edges of the board are half a width off its spine. Where they end on another edge does not matter but for the
 /// last tangent of an arc, which is kept.

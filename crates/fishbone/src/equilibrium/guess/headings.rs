@@ -1,13 +1,16 @@
-//! Which way the spine of the flat board heads.
+//! Headings of the spine of the flat board.
 
 use crate::problem::program::{BeltProgram, Piece};
 
-/// Which way the spine of the flat board heads.
+/// Reach of the mean heading below which a rib is square, in U.
+const SHORTEST: f64 = 1e-6;
+
+/// Headings of the spine of the flat board.
 pub(super) struct Headings {
     pub(super) u: Vec<f64>,
     /// Angle from η at the start towards ζ, at every node.
     pub(super) heading: Vec<f64>,
-    /// Its integral from the start.
+    /// Integral of the heading from the start, at every node.
     integral: Vec<f64>,
     /// Arc lengths where the rib is held.
     held: Vec<f64>,
@@ -35,9 +38,9 @@ impl Headings {
         }
     }
 
-    /// Rib slopes of which the flat direction is the mean heading within a reach on either side, less near held ribs.
+    /// Rib slopes whose flat direction is the mean heading within a reach on either side; the reach is shorter near held
+    /// ribs.
     pub(super) fn slopes(&self, reach: f64) -> Vec<f64> {
-        const SHORTEST: f64 = 1e-6;
         let slope = |(u, heading): (&f64, &f64)| {
             let reach = reach.max(SHORTEST).min(self.to_held(*u));
             let mean = (self.integral_at(u + reach) - self.integral_at(u - reach)) / (2.0 * reach);
@@ -49,7 +52,7 @@ impl Headings {
         self.u.iter().zip(&self.heading).map(slope).collect()
     }
 
-    /// Way to the nearest held rib.
+    /// Distance to the nearest held rib.
     pub(super) fn to_held(&self, u: f64) -> f64 {
         let ways = self.held.iter().map(|held| (held - u).abs());
         ways.fold(f64::INFINITY, f64::min)

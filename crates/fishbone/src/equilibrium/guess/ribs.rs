@@ -5,21 +5,24 @@ use crate::geometry::Pose;
 use crate::problem::program::{BeltPoint, BeltProgram, Piece};
 use nalgebra::Vector2;
 
-/// Rib slopes far from crossing, square where they are held so: the best of those in which the ribs turn with the spine,
-/// but more gently, over as many widths as it takes.
+/// Reaches over which ribs turn with the spine, tried in turn, in V.
+const REACHES: [f64; 7] = [0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0];
+/// Slack 1 − s v of ribs from which no longer reach is tried, dimensionless.
+const CALM: f64 = 0.3;
+
+/// Rib slopes far from crossing, square where ribs are held square: the best of several in which the ribs turn with the
+/// spine, more gently the longer the reach.
 ///
 /// Parallel ribs never cross, whatever the spine does; ribs square to the spine cross at every bend of the board.
 pub(super) fn calm_slopes(program: &BeltProgram) -> Vec<f64> {
-    const WIDTHS: [f64; 7] = [0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0];
-    const CALM: f64 = 0.3;
     let board = Headings::of(program);
     let width = program
         .elements()
         .map(|(_, element)| 2.0 * element.half_width)
         .fold(0.0, f64::max);
     let mut best = (f64::NEG_INFINITY, vec![0.0; board.u.len()]);
-    let smooth = WIDTHS.iter().map(|widths| board.slopes(widths * width));
-    let mitred = WIDTHS
+    let smooth = REACHES.iter().map(|widths| board.slopes(widths * width));
+    let mitred = REACHES
         .iter()
         .map(|widths| mitred_slopes(program, widths * width));
     for slopes in smooth.chain(mitred) {
@@ -42,7 +45,8 @@ pub(super) fn calm_slopes(program: &BeltProgram) -> Vec<f64> {
     best.1
 }
 
-/// Rib slopes along the mitre at every bend, square where held so, linear in between and square beyond a reach of both.
+/// Rib slopes along the mitre at every bend, square where ribs are held square, linear in between and square beyond a reach
+/// of both.
 fn mitred_slopes(program: &BeltProgram, reach: f64) -> Vec<f64> {
     let u = program.nodes();
     let mut anchors: Vec<(f64, f64)> = Vec::new();

@@ -1,4 +1,4 @@
-//! The programme as the solver asks for it: values and derivatives.
+//! The programme's values and derivatives, for the solver.
 
 use super::{BeltPoint, BeltProgram, DeadForce, Piece, ROWS, add_wrench, rows_of, slopes_of};
 use crate::geometry::{Pose, Twist, hat};
@@ -126,8 +126,8 @@ impl<D: Density<F>, const F: usize, const N: usize> Program<6, F, N> for BeltPro
         into.poses[0] = Pose::exp(&twist) * point.poses[0];
     }
 
-    /// The mean square over the board of how far it moves, in U², all of it weighing alike: a node carries half of both
-    /// pieces beside it, as a strip across the spine that turns with the frame.
+    /// The mean square displacement of the board, in U², of uniform weight: a node carries half of both pieces beside it, as
+    /// a strip across the spine that turns with the frame.
     fn metric(&self, point: &BeltPoint<F>) -> Vec<Matrix6<f64>> {
         let half_width = self.elements().map(|(_, element)| element.half_width);
         let across = half_width.fold(0.0, f64::max).powi(2) / 3.0;
@@ -192,7 +192,8 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         }
     }
 
-    /// Gradients of the bounds of an element's ribs; takes their second derivatives off those by its fields.
+    /// Gradients of the bounds of an element's ribs; subtracts their second derivatives from the Hessian by the element's
+    /// fields.
     fn linearise_bounds(
         &self,
         k: usize,
@@ -220,8 +221,8 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         }
     }
 
-    /// Gradients and second derivatives of the obstacles' gaps. The gradient of the programme takes on the contacts' wrench, for
-    /// the second derivatives along the chain; the contacts' own share of it is returned.
+    /// Gradients and second derivatives of the obstacles' gaps. The contacts' wrench is added to the gradient of the
+    /// programme, for the second derivatives along the chain; the contacts' own share of the gradient is returned.
     fn linearise_obstacles(
         &self,
         point: &BeltPoint<F>,
@@ -256,7 +257,7 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         contacts
     }
 
-    /// Takes the first-order part of the contacts off the gradient again: the solver adds it itself.
+    /// Subtracts the first-order part of the contacts from the gradient again: the solver adds it itself.
     fn leave_out(&self, mut contacts: Vec<NodeVector<N>>, into: &mut Linearisation<6, F, N>) {
         into.chain.carry_back(&mut contacts);
         for (gradient, contact) in into.gradient.iter_mut().zip(&contacts) {
@@ -264,7 +265,7 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         }
     }
 
-    /// How the slope is carried on across a joint, and what that bends of all that depends on it.
+    /// The slope carried on across a joint: its derivative, and the second derivative that it adds.
     fn linearise_tie(
         &self,
         k: usize,
@@ -275,19 +276,19 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         let Some([_, first, second]) = self.carried_slope(point, k + 1) else {
             return;
         };
-        let mut pull = into.gradient[k + 1][7];
+        let mut generalised_force = into.gradient[k + 1][7];
         if k + 1 < self.pieces.len() {
             for row in into.layout().stage_rows(k + 1) {
-                pull -= bounds[row] * into.stage_slacks[row][0][1];
+                generalised_force -= bounds[row] * into.stage_slacks[row][0][1];
             }
         }
         into.chain.stages[k].tie = [0.0; F];
         into.chain.stages[k].tie[1] = first;
         into.diagonal.controls[k] = StageMatrix::zeros();
-        into.diagonal.controls[k].first[(1, 1)] = second * pull;
+        into.diagonal.controls[k].first[(1, 1)] = second * generalised_force;
     }
 
-    /// Derivatives of supports, links and loads at their nodes, second ones by their states.
+    /// Derivatives of supports, links and loads at their nodes; second derivatives by the nodes' states.
     fn linearise_conditions(
         &self,
         point: &BeltPoint<F>,

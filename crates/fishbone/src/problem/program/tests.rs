@@ -54,8 +54,8 @@ impl Obstacle for Ball {
     }
 }
 
-/// A belt with one of everything: a straight stretch, a bend, an arc, a stiffener, a joint, a hinge, a link, weight,
-/// a dead force with a lever, an obstacle before two nodes.
+/// A belt with every kind of part: a straight stretch, a bend, an arc, a stiffener, a joint, a hinge, a link, weight, a dead
+/// force with a lever, an obstacle before two nodes.
 fn program() -> BeltProgram {
     let pieces = vec![
         element(0.2, 0.0),
@@ -144,7 +144,7 @@ fn point(program: &BeltProgram) -> BeltPoint {
     point
 }
 
-/// What the solver's linearisation is the second-order expansion of.
+/// The Lagrangian, of which the solver's linearisation is the second-order expansion.
 fn lagrangian(program: &BeltProgram, point: &mut BeltPoint, multipliers: &Multipliers) -> f64 {
     let mut values = Values::default();
     assert!(program.evaluate(point, &mut values));
@@ -327,7 +327,7 @@ fn dense_modes(program: &BeltProgram, at: &Stationary<BeltPoint>) -> Vec<f64> {
 
 #[test]
 fn test_lowest_modes_are_those_of_dense_matrices() {
-    // Without the clamp at the end, so that the constraints leave it free to move.
+    // Left out is the clamp at the end, so that the belt is free to move under its constraints.
     let whole = program();
     let supports = whole.supports[..2].to_vec();
     let program = whole.with_supports(supports);

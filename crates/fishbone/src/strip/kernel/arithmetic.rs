@@ -5,6 +5,7 @@ use super::{Lanes, Triple, Upper};
 /// An entry of a symmetric matrix.
 #[inline(always)]
 pub(super) fn entry(matrix: &Upper, i: usize, j: usize) -> f64 {
+    /// Index in the upper triangle of entry (i, j), a number.
     const AT: [[usize; 4]; 4] = [[0, 1, 2, 3], [1, 4, 5, 6], [2, 5, 7, 8], [3, 6, 8, 9]];
     matrix[AT[i][j]]
 }
@@ -67,7 +68,7 @@ pub(super) fn seen_from(frame: &[Triple; 3], a: Triple) -> Triple {
     [dot(frame[0], a), dot(frame[1], a), dot(frame[2], a)]
 }
 
-/// The inverse of that.
+/// A vector in the axes of a frame, in the axes of the world: the inverse of [`seen_from`].
 #[inline(always)]
 pub(super) fn in_world(frame: &[Triple; 3], a: Triple) -> Triple {
     three(|i| frame[0][i] * a[0] + frame[1][i] * a[1] + frame[2][i] * a[2])

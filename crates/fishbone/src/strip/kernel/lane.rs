@@ -7,8 +7,8 @@ use super::{Input, Lanes, Output, Spans, Triple, Upper};
 use crate::geometry::gauss_points;
 use crate::strip::developable::{EnergyModel, Term};
 
-/// The Magnus step of an element and what its derivatives are made of: the fields at the Gauss points, the weights of the
-/// sum and of the commutator.
+/// The Magnus step of an element, with the parts of its derivatives: the fields at the Gauss points, the weights of the sum
+/// and of the commutator.
 #[derive(Clone, Copy)]
 pub(super) struct Magnus {
     pub(super) rotation: Triple,
@@ -71,7 +71,7 @@ impl Magnus {
         ]
     }
 
-    /// Derivatives of the translation, which is along ξ, by the same.
+    /// Derivatives of the translation, which is along ξ, by (bend, slope) at the first Gauss point, then at the second.
     #[inline(always)]
     fn translation_by_gauss(&self) -> [f64; 4] {
         [-self.weight, 0.0, self.weight, 0.0]
@@ -101,7 +101,7 @@ impl Magnus {
     }
 }
 
-/// Weight of the commutator in the Magnus step, of the square of its length.
+/// Weight √3/12 of the commutator in the Magnus step, per square of the step's length, dimensionless.
 const COMMUTATOR: f64 = 0.144_337_567_297_406_43;
 
 /// Derivatives of one lane, from the even functions of its rotation.
@@ -162,7 +162,7 @@ pub(super) fn differentiate_lane(
         force: force_in_world,
         moment: moment_in_world,
     };
-    // A loop over these would be taken for the one to run in lanes.
+    // Written out: the vectoriser would take a loop over the four columns for the loop over lanes.
     place.carry(
         turns[0],
         shifts[0],
@@ -193,7 +193,7 @@ pub(super) fn differentiate_lane(
     );
 }
 
-/// Where an element is, how far it leads, and the wrench beyond it about the origin.
+/// The place of an element: its first node's frame and position, the motion along it, the wrench beyond it about the origin.
 struct Place {
     frame: [Triple; 3],
     position: Triple,
@@ -309,7 +309,7 @@ fn work(
             - cosine[1] * once[i]
             - 0.5 * cubic[0] * moment[i]
     });
-    // By the translation along ξ, and by that and φ.
+    // Second derivatives by the translation along ξ and the rotation φ.
     let force_once = cross(phi, force);
     let force_twice = cross(phi, force_once);
     let lead = 2.0 * (cubic[1] * force_twice[0] - cosine[1] * force_once[0] - cubic[0] * force[0]);
@@ -391,7 +391,7 @@ fn bending(model: EnergyModel, step: &Magnus, rigidity: [f64; 2]) -> Bending {
     }
 }
 
-/// From derivatives by the fields at the Gauss points to those at the nodes.
+/// Derivatives by the fields at the nodes, from derivatives by the fields at the Gauss points.
 #[inline(always)]
 fn by_nodes([b1, s1, b2, s2]: [f64; 4]) -> [f64; 4] {
     let [less, more] = gauss_points();
@@ -409,7 +409,7 @@ fn triples_by_nodes(by_gauss: &[Triple; 4]) -> [Triple; 4] {
     four(|j| [x[j], y[j], z[j]])
 }
 
-/// The same for a Hessian.
+/// A Hessian by the fields at the nodes, from one by the fields at the Gauss points.
 #[inline(always)]
 fn quadratic_by_nodes(by_gauss: &Upper) -> Upper {
     let columns = four(|j| by_nodes(four(|i| entry(by_gauss, i, j))));
