@@ -4,7 +4,7 @@ use fishbone::geometry::Pose;
 use fishbone::problem::program::{BeltPoint, BeltProgram, Hold, NodeSupport, Piece};
 use fishbone::strip::automatic;
 use fishbone::strip::density::{Density, Section};
-use fishbone::strip::developable::Curl;
+use fishbone::strip::element::Curl;
 use fishbone::strip::element::Element;
 use nalgebra::{SVector, UnitQuaternion, Vector3};
 use num_dual::DualNum;

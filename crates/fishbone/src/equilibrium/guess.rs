@@ -401,7 +401,8 @@ mod tests {
     use super::*;
     use crate::problem::program::Hold;
     use crate::problem::program::Piece;
-    use crate::strip::developable::{Curl, EnergyModel};
+    use crate::strip::developable::EnergyModel;
+    use crate::strip::element::Curl;
     use crate::strip::element::Element;
 
     fn held(node: usize, position: [f64; 3], rotation: Option<[f64; 3]>) -> NodeSupport {

@@ -4,7 +4,7 @@ use crate::geometry::gauss_points;
 use crate::problem::program::Piece;
 use crate::scenario::error::ScenarioError;
 use crate::scenario::{BeltSpec, Rigidity, SAME_PLACE, SegmentSpec};
-use crate::strip::developable::Curl;
+use crate::strip::element::Curl;
 use crate::strip::element::Element;
 
 /// A belt in the units of its scenario.

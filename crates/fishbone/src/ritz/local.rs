@@ -2,7 +2,8 @@
 
 use super::Orientation;
 use super::basis::LOCALS;
-use crate::strip::developable::{Curl, EnergyModel};
+use crate::strip::developable::EnergyModel;
+use crate::strip::element::Curl;
 use crate::strip::ribs::Across;
 use nalgebra::{Matrix3, SVector};
 use num_dual::DualNum;

@@ -5,8 +5,7 @@
 //! at the element's two Gauss points.
 
 use crate::geometry::{Pose, gauss_points};
-use crate::strip::developable::Curl;
-use crate::strip::element::Element;
+use crate::strip::element::{Curl, Element};
 use nalgebra::{SVector, Vector6};
 use num_dual::DualNum;
 use stagewise::{Stage, StageMatrix};

@@ -1,11 +1,9 @@
 //! Bending energy of the belt per unit length of the spine: the three models, Eq. (34) and its successors.
 
 use crate::names::named;
-use crate::strip::density::{Density, Section};
-use crate::strip::element::Element;
-use crate::strip::kernel;
+use crate::strip::element::Curl;
 use crate::strip::ribs::{Across, Scaled};
-use nalgebra::{Matrix2, Vector2, Vector4};
+use nalgebra::{Matrix2, Vector2};
 use num_dual::DualNum;
 
 named! {
@@ -20,15 +18,6 @@ named! {
         #[default]
         Wunderlich = "wunderlich",
     }
-}
-
-/// The natural bend of a belt, with its Poisson's ratio.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Curl<W = f64> {
-    /// Natural bend k, the ω_ζ of the unloaded belt.
-    pub bend: W,
-    /// Poisson's ratio ν: bending along the curl bends the plate across it by ν as much.
-    pub poisson: f64,
 }
 
 /// A term of the density with its first and second derivatives by (bend, slope).
@@ -149,25 +138,6 @@ impl EnergyModel {
             2.0 * p * slope * lowest * t,
             2.0 * p * lowest * (t + 2.0 * (p - 1.0) * slope * slope),
         ]
-    }
-}
-
-impl Density<2> for EnergyModel {
-    type Motions = kernel::Motions;
-    type Derivatives = kernel::Block;
-
-    fn value<T: DualNum<Primitive = f64> + Copy>(&self, section: &Section<'_, T, 2>) -> T {
-        let [bend, slope] = section.fields;
-        let slopes = section.ends.map(|end| end[1]);
-        let across = match self.knows_width() {
-            true => section.element.strips().across(slopes),
-            false => Across::PLAIN.map(T::from),
-        };
-        EnergyModel::value(*self, bend, slope, section.curl(), &across)
-    }
-
-    fn energy(&self, element: &Element, [a, b]: [&Vector2<f64>; 2]) -> f64 {
-        element.energy(*self, &Vector4::new(a[0], a[1], b[0], b[1]))
     }
 }
 

@@ -7,15 +7,20 @@
 
 mod arithmetic;
 mod lane;
+#[cfg(test)]
+mod tests;
 
 use crate::geometry::{Coefficients, Pose};
 use crate::strip::density::{self, LANES, Loaded};
 use crate::strip::developable::EnergyModel;
-use crate::strip::element::{Element, Jet};
+use crate::strip::element::Element;
+use crate::strip::energy::Jet;
+use crate::strip::ribs::Across;
 use arithmetic::{cross, dot, triple};
 use lane::{Magnus, differentiate_lane};
 use multiversion::multiversion;
 use nalgebra::{Matrix3, SMatrix, SVector, Vector2, Vector3, Vector4};
+use num_dual::DualNum;
 use stagewise::{Stage, StageMatrix};
 
 /// One number for every element of a block.
@@ -108,6 +113,25 @@ impl Default for Motions {
             frame: [NOTHING; 9],
             position: [NOTHING; 3],
         }
+    }
+}
+
+impl density::Density<2> for EnergyModel {
+    type Motions = Motions;
+    type Derivatives = Block;
+
+    fn value<T: DualNum<Primitive = f64> + Copy>(&self, section: &density::Section<'_, T, 2>) -> T {
+        let [bend, slope] = section.fields;
+        let slopes = section.ends.map(|end| end[1]);
+        let across = match self.knows_width() {
+            true => section.element.strips().across(slopes),
+            false => Across::PLAIN.map(T::from),
+        };
+        EnergyModel::value(*self, bend, slope, section.curl(), &across)
+    }
+
+    fn energy(&self, element: &Element, [a, b]: [&Vector2<f64>; 2]) -> f64 {
+        element.energy(*self, &Vector4::new(a[0], a[1], b[0], b[1]))
     }
 }
 

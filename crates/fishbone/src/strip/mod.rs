@@ -5,6 +5,7 @@ pub mod bounds;
 pub mod density;
 pub mod developable;
 pub mod element;
+pub(crate) mod energy;
 pub mod kernel;
 pub mod ribs;
 pub mod spine;

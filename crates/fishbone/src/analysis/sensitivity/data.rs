@@ -2,7 +2,8 @@
 
 use crate::geometry::gauss_points;
 use crate::strip::bounds::{ActiveEdges, Edge, RibBounds};
-use crate::strip::developable::{Curl, EnergyModel};
+use crate::strip::developable::EnergyModel;
+use crate::strip::element::Curl;
 use crate::strip::element::Element;
 use crate::strip::ribs::{Across, Strips};
 use nalgebra::{Matrix4, SVector, Vector2, Vector4};
@@ -144,7 +145,8 @@ mod tests {
     use crate::board::samples::{Part, Plan};
     use crate::geometry::Pose;
     use crate::strip::density::{Derivatives, Loaded};
-    use crate::strip::element::{Jet, increment};
+    use crate::strip::element::increment;
+    use crate::strip::energy::Jet;
     use crate::strip::kernel::Block;
     use nalgebra::Vector6;
     use num_dual::Dual64;

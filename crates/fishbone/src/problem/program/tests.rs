@@ -1,6 +1,6 @@
 use super::*;
 use crate::strip::bounds::Edge;
-use crate::strip::developable::Curl;
+use crate::strip::element::Curl;
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, SymmetricEigen, Vector2};
 use stagewise::{Linearisation, Multipliers, Program, Stationary, Values, lowest_modes};
 use std::sync::Arc;
