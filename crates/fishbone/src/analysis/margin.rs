@@ -117,8 +117,8 @@ impl Equilibrium {
     /// Distance a support may move along a direction before stability is lost; `None` if stability is kept within `reach`,
     /// or if the belt comes to its inextensible limit before.
     ///
-    /// Directions are displacement in U and rotation left in world axes about the support point; their length does not matter.
-    /// `proceed` is asked once a step whether to go on.
+    /// Directions are displacement in U and rotation left in world axes about the support point; their length does not
+    /// matter. `proceed` is asked once a step whether to go on.
     ///
     /// # Errors
     ///

@@ -14,7 +14,8 @@ use thiserror::Error;
 /// Distance between equilibria up to which a step downhill is no snap, in U: a rib bound that passes from one element to the
 /// next moves the belt by as much.
 const SMALLEST_JUMP: f64 = 2e-3;
-/// Distance between shapes up to which a change of active edges is no snap, in U: ribs held by another edge move the belt less.
+/// Distance between shapes up to which a change of active edges is no snap, in U: ribs held by another edge move the belt
+/// less.
 const SAME_SHAPE: f64 = 0.01;
 
 /// The reason why an equilibrium cannot be followed.

@@ -345,8 +345,8 @@ fn more_than_a_turn((i, support): (usize, &SupportSpec)) -> Option<String> {
 }
 
 /// Stability by the second variation; `None` where it is undecided. Where a part of the belt is flat, every slope of its
-/// ribs costs the same. Under stress the belt may have a compliance with other slopes, which the second variation with these
-/// slopes held does not show, unless it is negative already.
+/// ribs costs the same. Under stress the second variation with these slopes held does not show whether the belt is unstable
+/// with other slopes, unless it is negative already.
 fn stability(
     status: Status,
     inertia: Option<Inertia>,

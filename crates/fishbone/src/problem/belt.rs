@@ -241,8 +241,9 @@ impl Belt {
     }
 
     /// The pieces of a mesh of `count` elements, shared out by length. There are more elements where a share is not whole,
-    /// between two breaks, ends of segments or entries of a table of rigidity. A stiffened stretch is one piece. Units:
-    /// lengths in U, rigidity in its mean.
+    /// between two breaks, ends of segments or entries of a table of rigidity. A stiffened stretch is one piece.
+    ///
+    /// Units: lengths in U, rigidity in its mean.
     pub(crate) fn pieces(&self, count: usize, breaks: &[Break]) -> Vec<Piece> {
         let shared = self.pieces_shared(&self.shares(count, breaks), breaks);
         shared.expect("a share for every stretch")

@@ -1,8 +1,8 @@
 //! A belt problem: a validated scenario with its belt, its units and its origin. Every computation starts from a
 //! [`Problem`].
 //!
-//! A [`Problem`] can only be made of a scenario that [`Scenario::validate`] passes, and cannot be changed afterwards: a problem
-//! with other numbers is another problem, validated in its turn.
+//! A [`Problem`] can only be made of a scenario that [`Scenario::validate`] passes, and cannot be changed afterwards: a
+//! problem with other numbers is another problem, validated in its turn.
 
 mod active_set;
 mod assembly;

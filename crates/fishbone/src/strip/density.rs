@@ -59,7 +59,8 @@ pub struct Loaded<'a, const F: usize> {
     pub fields: [&'a SVector<f64, F>; 2],
     /// Poses of both nodes.
     pub poses: [&'a Pose; 2],
-    /// Derivative of all work by a twist of the belt from the second node on: force, then moment about the origin, world axes.
+    /// Derivative of all work by a twist of the belt from the second node on: force, then moment about the origin, world
+    /// axes.
     pub wrench: &'a Vector6<f64>,
 }
 
