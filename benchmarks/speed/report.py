@@ -174,7 +174,7 @@ COLD = [
 ]
 RANDOM = ["", "poses", "converged", "our shape", "of less energy", "of more", "p50 [ms]", "over ours"]
 WARM = ["", "updates", "failed", "iterations", "p50 [ms]", "p99", "p99.9", "p50 over ours"]
-BRANCHES = ["", "updates", "on another branch", "snaps told"]
+BRANCHES = ["", "updates", "on another branch", "snaps reported"]
 DERIVATIVES = ["µs (iterations)", "iteration", "factorise", "forward product", "adjoint product", "Jacobian"]
 SCALING = ["elements", "iterations", "ms an iteration", "µs an iteration and element", "memory [MB]", "kB an element"]
 BATCH = ["threads", "scenarios", "converged", "time [s]", "a second", "speed-up"]
@@ -203,7 +203,7 @@ def text(header: list[str], rows: Rows) -> str:
 
 def machine_rows(result: Record) -> Rows:
     """Where, when and with what it was measured."""
-    threads = f"{result['threads']}, unless said otherwise"
+    threads = f"{result['threads']}, unless stated otherwise"
     return [
         ["processor", f"{result['processor']}, {result['cores']} cores, {result['system']}"],
         ["threads", threads],
