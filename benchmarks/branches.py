@@ -1,11 +1,11 @@
-"""Whether `fishbone.branches` finds every energy level that random searches find, and only levels that refinement confirms.
+"""Whether `fishbone.branches` finds every energy level of random searches, and only levels that refinement confirms.
 
     python benchmarks/branches.py [--count 50] [--guesses 200] [--seed 1]
 
 The scenarios are those of random_poses.py. A random shape has a bend and a rib slope that are sums of five cosines with
 random amplitudes and phases, up to the bend of a ring and slopes of a half, root mean square; it does not meet its
-supports. Every shape is solved again on a mesh twice as fine. Two energies count as one level if their difference is less
-than this refinement changes one of them.
+supports. Every shape is solved again on a mesh twice as fine. Two energies count as one level if their difference is
+less than this refinement changes one of them.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ POINTS = 161
 SAME_LEVEL = 1e-4
 """Energies that differ by less than this share are one level in any case."""
 MESH, NEAR = 2e-2, 3e-2
-"""Largest changes on a mesh twice as fine that confirm an equilibrium: relative of the energy, and of the shape, in U."""
+"""Largest changes by refinement that confirm an equilibrium: relative of the energy, and of the shape, in U."""
 
 
 def smooth_field(rng: np.random.Generator, size: float) -> Floats:

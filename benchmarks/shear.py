@@ -2,8 +2,8 @@
 
     python benchmarks/shear.py
 
-A straight band is held between clamps 0.75 U apart along y. Its far clamp moves along z to 0.4 U and back, in steps of a
-thousandth of the length of the band.
+A straight band is held between clamps 0.75 U apart along y. Its far clamp moves along z to 0.4 U and back, in steps of
+a thousandth of the length of the band.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def swing(ratio: int, energy: str, per_width: int = PER_WIDTH) -> Swing:
         states.append((tracker.energy, tracker.reaction("end").force[2], tracker.position[:, 0].max()))
     levels, force, height = np.array(states).T
     steps = np.diff(z)
-        # Without a snap the energy changes by the work of the force.
+    # Without a snap the energy changes by the work of the force.
     falls = levels[:-1] + force[:-1] * steps - levels[1:]
     snaps = [Snap(z[k + 1], falls[k]) for k in np.flatnonzero(falls > FALL)]
     turn = int(np.searchsorted(np.flatnonzero(falls > FALL), STEPS))
