@@ -1,11 +1,11 @@
-# make demo     solves example 1: the table here, out/example1.json and out/example1.png
-# make test     everything that must hold
-# make test-all the same, and the tests that take long
-# make docs     the documents as a site: out/site/index.html
-# make wheel    a wheel that anyone can install, in dist; tried in an empty environment, without cargo
+# make demo     solves example 1: prints a table, writes out/example1.json and out/example1.png
+# make test     runs all checks and tests but those that take long
+# make test-all runs the tests that take long, too
+# make docs     builds the documents as a site: out/site/index.html
+# make wheel    builds a wheel that anyone can install, in dist; tests it in an empty environment, without cargo
 # make figures  draws the pictures of README.md and docs
-# make bench    measures how fast it is beside what one would use instead, and writes docs/performance.md
-# make clean    removes what these made
+# make bench    measures the times of fishbone and of its alternatives, and writes docs/performance.md
+# make clean    removes the files that these targets made
 #
 # `make bench BENCH="--only cold --dry-run"` measures a part and saves nothing.
 # Needs cargo, Python 3.10 or newer and make; everything else goes into .venv.
@@ -24,7 +24,7 @@ ZIG = $(if $(filter x86_64-unknown-linux-gnu aarch64-unknown-linux-gnu,$(HOST)),
 
 NEED_CARGO := @command -v cargo >/dev/null || { echo "fishbone needs cargo, which comes with Rust: https://rustup.rs" >&2; exit 1; }
 
-# What each step depends on, so that a second run does only what has changed.
+# The inputs of each step, so that a second run redoes only the steps whose inputs have changed.
 RUST_SOURCES := Cargo.toml Cargo.lock $(shell find crates scenarios -type f)
 PYTHON_SOURCES := pyproject.toml $(shell find python tests benchmarks docs -name '*.py' -o -name '*.pyi')
 TEXTS := $(shell find *.md LICENSE CITATION.cff docs scenarios tests -type f -not -name '*.pyc' 2>/dev/null)
@@ -49,7 +49,7 @@ test-all: test $(VENV)/.pytest-full
 docs: $(SITE)/index.html
 	@echo "$< written"
 
-# Always from nothing: Sphinx warns of what is wrong with a page only when it reads it.
+# Always built afresh: Sphinx warns about a page only when it reads the page.
 $(SITE)/index.html: $(CORE) $(PYTHON_SOURCES) $(TEXTS)
 	@echo "building the documents"
 	@rm -rf $(SITE)
@@ -57,7 +57,7 @@ $(SITE)/index.html: $(CORE) $(PYTHON_SOURCES) $(TEXTS)
 	@rm -r $(SITE)/.doctrees
 	@cp $(SITE)/README.html $@
 
-# By way of the source distribution, so that it is complete. No path of this machine stays in what is compiled.
+# The wheel is built from the source distribution, which tests that it is complete. The core has no path of this machine.
 wheel: $(VENV)/.wheel
 	$(NEED_CARGO)
 	@echo "building a wheel (a few minutes the first time)"
@@ -76,7 +76,7 @@ $(VENV)/.wheel: $(VENV)/.packages requirements-wheel.txt
 figures: $(CORE)
 	@PYTHONPATH=benchmarks $(BIN)/python docs/make_figures.py
 
-# On one thread, so that the clock is that of the work: threads of BLAS only wait on matrices as small as these.
+# On one thread: on matrices as small as these, further threads of BLAS only wait, and their waiting is in the times.
 bench: $(VENV)/.bench
 	@PYTHONPATH=benchmarks OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m speed $(BENCH)
 
@@ -115,7 +115,7 @@ $(VENV)/.rust: $(VENV)/.packages $(RUST_SOURCES)
 	@cargo test --quiet --locked --workspace
 	@touch $@
 
-# Where the target is missing no stamp is left, so that every run says so.
+# Without the target no stamp is left, so that every run reports it.
 $(VENV)/.wasm: $(VENV)/.packages $(RUST_SOURCES)
 	$(NEED_CARGO)
 	@if test -d "$$(rustc --print target-libdir --target $(WASM))"; then \

@@ -1,11 +1,11 @@
-"""Whether `fishbone.branches` finds every energy level that searches from random shapes find, and none but true ones.
+"""Whether `fishbone.branches` finds every energy level of random searches, and only levels that refinement confirms.
 
     python benchmarks/branches.py [--count 50] [--guesses 200] [--seed 1]
 
 The scenarios are those of random_poses.py. A random shape has a bend and a rib slope that are sums of five cosines with
 random amplitudes and phases, up to the bend of a ring and slopes of a half, root mean square; it does not meet its
-supports. Every shape is solved for again on a mesh twice as fine; levels that are nearer to each other than what this
-changes of one of them are one: the mesh does not tell them apart.
+supports. Every shape is solved again on a mesh twice as fine. Two energies count as one level if their difference is
+less than this refinement changes one of them.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ POINTS = 161
 SAME_LEVEL = 1e-4
 """Energies that differ by less than this share are one level in any case."""
 MESH, NEAR = 2e-2, 3e-2
-"""What a mesh twice as fine may change of an energy, as a share, and of a shape, in U."""
+"""Largest changes by refinement that confirm an equilibrium: relative of the energy, and of the shape, in U."""
 
 
 def smooth_field(rng: np.random.Generator, size: float) -> Floats:
@@ -47,7 +47,7 @@ def random_shape(rng: np.random.Generator) -> tuple[Floats, Floats]:
 
 
 class Level(NamedTuple):
-    """An energy, and how well the mesh tells it."""
+    """An energy on the default mesh and on one twice as fine."""
 
     coarse: float
     fine: float
@@ -59,7 +59,7 @@ class Level(NamedTuple):
 
 
 def level(coarse: Equilibrium) -> Level | None:
-    """The level of an equilibrium; None where a mesh twice as fine has none like it."""
+    """The level of an equilibrium; None where it is unconfirmed on refinement."""
     fine = coarse.refined(2 * (len(coarse.u) - 1))
     if fine is None or abs(fine.energy - coarse.energy) > MESH * abs(coarse.energy):
         return None
@@ -78,7 +78,7 @@ def random_minima(scenario: Scenario, rng: np.random.Generator, guesses: int) ->
 
 
 def apart(levels: list[Level]) -> list[Level]:
-    """One of each that are the same."""
+    """The distinct levels."""
     distinct: list[Level] = []
     for one in levels:
         if not any(one.is_same(other) for other in distinct):
@@ -94,7 +94,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
     rng = np.random.default_rng(options.seed)
-    total = {"levels": 0, "of the mesh": 0, "missed": 0, "branches": 0, "unconfirmed": 0}
+    total = {"levels": 0, "refuted": 0, "missed": 0, "branches": 0, "unconfirmed": 0}
     for index in range(options.count):
         scenario = random_poses.scenario(random_poses.ENERGIES[index % 3], *random_poses.pose(rng))
         began = time.perf_counter()
@@ -108,7 +108,7 @@ def main() -> None:
         doubtful = [b.energy for b, one in zip(branches, levels, strict=True) if one is None]
         distinct = len(apart(true))
         total["levels"] += distinct
-        total["of the mesh"] += len(by_chance) - len(true)
+        total["refuted"] += len(by_chance) - len(true)
         total["missed"] += len(lost)
         total["branches"] += len(branches)
         total["unconfirmed"] += len(doubtful)
@@ -123,11 +123,11 @@ def main() -> None:
     rows = [
         ["scenarios", str(options.count)],
         ["random searches of each", str(options.guesses)],
-        ["levels that they find", str(total["levels"])],
-        ["minima that they find and a mesh twice as fine does not have", str(total["of the mesh"])],
+        ["levels that the random searches find", str(total["levels"])],
+        ["minima of the random searches that are unconfirmed on refinement", str(total["refuted"])],
         ["levels that `branches` misses", str(total["missed"])],
-        ["what `branches` finds", str(total["branches"])],
-        ["of these not confirmed by a mesh twice as fine", str(total["unconfirmed"])],
+        ["equilibria that `branches` finds", str(total["branches"])],
+        ["of these unconfirmed on refinement", str(total["unconfirmed"])],
     ]
     tables.write("branches", tables.table(["", ""], rows))
 

@@ -1,4 +1,4 @@
-"""The cases that tables and figures share, and what is measured on them."""
+"""The cases that tables and figures share, and their measured quantities."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def shapes() -> list[fb.Equilibrium]:
 
 
 def apart(found: list[fb.Equilibrium], count: int) -> list[fb.Equilibrium]:
-    """The lowest of them that are apart from all lower ones, by a fifth of the length somewhere."""
+    """The lowest shapes that differ from all lower ones by a fifth of the length somewhere."""
     chosen: list[fb.Equilibrium] = []
     for shape in found:
         moves = [np.linalg.norm(shape.position - lower.position, axis=1).max() for lower in chosen]
@@ -99,7 +99,7 @@ def shell(name: str) -> dict[str, Any]:
 
 
 def on_shell(name: str, energy: str) -> fb.Equilibrium:
-    """The belt of a shell reference; of a curved board, which has states on both sides, the one on the shell's."""
+    """The belt of a shell reference; a curved board has equilibria on both sides and bulges to the shell's side."""
     data = shell(name)
     turn = Rotation.from_matrix(data["end_rotation_matrix"]).as_rotvec()
     tables = clamped(data["end_position"], turn, **{key: data[key] for key in ("length", "width")})
@@ -169,7 +169,7 @@ class Refinement(NamedTuple):
 
 
 def refine(tables: dict[str, Any], energy: str, elements: tuple[int, ...]) -> Refinement:
-    """Solves on meshes of which each halves the elements of the one before."""
+    """Solves on meshes, each with elements half as long as those of the mesh before."""
     shapes = [solve(tables, energy, count) for count in elements]
     common = [shape.position[:: count // elements[0]] for shape, count in zip(shapes, elements, strict=True)]
     return Refinement(

@@ -1,19 +1,20 @@
-"""Whether fishbone computes what it computed before, to the last digits: for changes that are to change nothing.
+"""Comparison with saved results, to the last digits: for changes of the code that must not change results.
 
     python benchmarks/golden.py save FILE [--only GROUP …]
     python benchmarks/golden.py compare FILE [--only GROUP …] [--tolerance 1e-10] [--strict]
 
-What is compared is the installed package, with what another build of it saved; results/golden.json.gz is such a file.
-`compare` fails where a status differs, or a number by more than the tolerance; with --strict it fails too where the
-iterations differ. A run takes two minutes on one core.
+`compare` compares the installed package with the saved results of another build, such as results/golden.json.gz. It
+fails where a status differs, or a number by more than the tolerance; with --strict it fails too where the iterations
+differ. A run takes two minutes on one core.
 
 Energies and eigenvalues are compared each with itself, positions with the length of the belt, all else with the largest
 of its kind in the case.
 
-Rounding alone may change some of it. Where sines are rounded otherwise (glibc told to do without FMA), solves, poses,
-trackers and branches stay within 1e-14. But the source's method, which never converges, differs by 4e-7; what is
-followed along sheared bands and the S by 1e-10 to 2e-7; the nearest margin of the arch may be its mirror twin; and what
-crosses the arch that is moved aside is a pitchfork or cannot be followed. The number of threads changes nothing.
+Rounding alone may change results. With other roundings of sines (glibc without FMA), solves, poses, trackers and
+branches stay within 1e-14. But the source's method, which never converges, differs by 4e-7; the continuations of
+sheared bands and of the S differ by 1e-10 to 2e-7; the nearest margin of the arch may be its mirror image; and the
+branch that crosses the arch that is moved aside is a pitchfork or cannot be followed. The number of threads changes
+nothing.
 """
 
 from __future__ import annotations
@@ -61,9 +62,9 @@ TOLERANCE = 1e-10
 MARGINS_BY = 1e3
 """Factor on the tolerance of margins: the nearest one is where a search ends, to 1e-6 in its direction squared."""
 NAMED = 10
-"""So many of the cases that differ most are named."""
+"""Number of cases named, those that differ most."""
 NOUGHT = 1e-6
-"""An energy that is so small beside another of the case is compared with so much of that: a taut belt has none."""
+"""Smallest scale of an energy, as a share of the largest energy of the case: that of a belt without slack is 0."""
 NODES, FEW_NODES = 9, 3
 POSES, STARTS, UPDATES, MODES = 1000, 60, 200, 4
 
@@ -75,7 +76,7 @@ QUANTITIES: dict[str, Callable[[Floats, Case], Floats]] = {
     "derivative": lambda saved, _: np.full_like(saved, np.max(np.abs(saved))),
     "eigenvalue": lambda saved, _: np.abs(saved),
 }
-"""What is compared, and relative to what."""
+"""The quantities compared, and the scale of each."""
 
 
 # ----------------------------------------------------------------------------------------------- what is computed
@@ -96,7 +97,7 @@ def _some(position: Floats, count: int) -> list[float]:
 
 
 def _case(equilibrium: fb.Equilibrium, nodes: int = NODES) -> Case:
-    """A solve, with what supports and links do."""
+    """A solve, with the forces of supports and links."""
     e, length = equilibrium, float(equilibrium.u[-1])
     status = {"status": [e.status, e.stable, e.negative_modes, e.zero_modes], "iterations": [e.iterations]}
     if e.status == "infeasible":
@@ -105,7 +106,7 @@ def _case(equilibrium: fb.Equilibrium, nodes: int = NODES) -> Case:
     try:
         reactions = [_wrench(e.reaction(index), length) for index in supports]
     except fb.NoSupport:
-        reactions = []  # the source's method knows none
+        reactions = []  # the source's method has none
     return status | {
         "length": length,
         "energy": [e.energy, e.elastic_energy],
@@ -138,7 +139,7 @@ def scenarios() -> Cases:
 
 
 def variants() -> Cases:
-    """Every shipped scenario by every energy and on a finer mesh; the source's method; what is out of reach."""
+    """Every shipped scenario by every energy and on a finer mesh; the source's method; supports out of reach."""
     given = {f"{p.stem}, {energy}": _changed(_example(p.stem), energy) for p in SCENARIOS for energy in ENERGIES}
     given |= {f"{p.stem}, 200 elements": _changed(_example(p.stem), elements=200) for p in SCENARIOS}
     given |= {f"{name}, ritz": _changed(_example(name), "fishbone", method="ritz") for name in EXAMPLES}
@@ -147,7 +148,7 @@ def variants() -> Cases:
 
 
 def boards() -> Cases:
-    """What no shipped scenario has: links, supports along the belt, slides, hinges, several loads and rigidities."""
+    """Cases beyond the shipped scenarios: links, inner supports, slides, hinges, several loads and rigidities."""
     return {name: _case(fb.solve(fb.Scenario.from_dict(tables))) for name, tables in _boards()}
 
 
@@ -228,7 +229,7 @@ def _band(energy: str) -> fb.Scenario:
 
 
 def _paths() -> Iterator[tuple[str, fb.Diagram]]:
-    """What is followed: folds and pitchforks of planar belts, sheared bands, boards of all kinds."""
+    """Continuations: folds and pitchforks of planar belts, sheared bands, boards of all kinds."""
     x, z, angle = "supports[1].position[0]", "supports[1].position[2]", "supports[1].rotation[2]"
     yield "arch turned back", fb.follow(_arch(), {angle: -1.5})
     yield "arch moved aside", fb.follow(_arch(), {x: 0.7})
@@ -259,7 +260,7 @@ def _paths() -> Iterator[tuple[str, fb.Diagram]]:
 
 
 def follow() -> Cases:
-    """Branches, how they end, their events, and what the belt snaps to."""
+    """Branches, their ends, their events, and the minima after snaps."""
     return {name: _diagram(diagram) for name, diagram in _paths()}
 
 
@@ -304,7 +305,7 @@ def _levels(found: list[fb.Equilibrium]) -> Case:
 
 
 def margins() -> Cases:
-    """How far a support may move: to a fold, to a pitchfork, and to what is nearest."""
+    """Margins of a support: to a fold, to a pitchfork, and to the nearest loss of stability."""
     arch = fb.solve(_arch())
     margins = {
         "arch, to its fold": arch.snap_margin(direction=(0.0, 0.0, 0.0, 0.0, 0.0, -1.0), reach=1.5),
@@ -362,7 +363,7 @@ def _tracked(name: str, scenario: fb.Scenario, way: Iterable[tuple[Floats, Float
 
 
 def derivatives() -> Cases:
-    """Jacobians and products of sensitivities: of each array its norm, and its product with fixed weights."""
+    """Jacobians and products of sensitivities: the norm of each array, and its product with fixed weights."""
     cases = {}
     for name in (*EXAMPLES, "bent", "curved", "twist", "cantilever"):
         equilibrium = _solved(name)
@@ -421,7 +422,7 @@ def compute(names: Iterable[str]) -> dict[str, Cases]:
 
 
 def about() -> dict[str, Any]:
-    """Which build, and where it ran."""
+    """The build and its machine."""
     return {
         "schema": SCHEMA,
         "commit": _commit(Path(fb.__file__).parent),
@@ -432,10 +433,10 @@ def about() -> dict[str, Any]:
 
 
 def _commit(folder: Path) -> str:
-    """The commit that a folder is of: that of the package, which need not be that of this script."""
+    """The commit of a folder: that of the package, which need not be that of this script."""
     command = ["git", "describe", "--always", "--dirty"]
-    told = subprocess.run(command, cwd=folder, check=False, capture_output=True, text=True)
-    return told.stdout.strip() or "unknown"
+    run = subprocess.run(command, cwd=folder, check=False, capture_output=True, text=True)
+    return run.stdout.strip() or "unknown"
 
 
 def write(path: Path, table: Mapping[str, Any]) -> None:
@@ -445,7 +446,7 @@ def write(path: Path, table: Mapping[str, Any]) -> None:
 
 
 def read(path: Path) -> dict[str, Any]:
-    """What `write` wrote."""
+    """The table that `write` wrote."""
     table: dict[str, Any] = json.loads(gzip.decompress(path.read_bytes()))
     if table["schema"] != SCHEMA:
         raise SystemExit(f"{path}: found schema {table['schema']}, allowed {SCHEMA}")
@@ -460,7 +461,7 @@ class Difference(NamedTuple):
 
     name: str
     status: str
-    """What differs in words; empty where nothing does."""
+    """The differences in words; empty if there are none."""
     iterations: bool
     values: dict[str, float]
     """Largest relative differences by quantity."""
@@ -524,7 +525,7 @@ def _largest(quantity: str, cases: list[Difference]) -> str:
 
 
 def wrong(differences: dict[str, list[Difference]], tolerance: float) -> list[str]:
-    """A line for each case that differs by more than it may, those of another status first, then by how much."""
+    """A line for each case beyond its tolerance: cases of another status first, then by the difference."""
     cases = [(group, case) for group, listed in differences.items() for case in listed]
     allowed = {group: tolerance * (MARGINS_BY if group == "margins" else 1.0) for group in differences}
     beyond = [(group, case) for group, case in cases if case.status or case.largest > allowed[group]]

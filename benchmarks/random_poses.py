@@ -1,4 +1,4 @@
-"""Random clamped poses: how many converge from the automatic guess, in how many iterations and how long.
+"""Random clamped poses: convergence from the automatic guess, iterations and times.
 
     python benchmarks/random_poses.py [--count 1000] [--seeds 1 2 3 4 5]
 

@@ -1,4 +1,4 @@
-"""What the source's own method computes: the tables "ritz …" of docs/validation.md.
+"""Results of the source's own method: the tables "ritz …" of docs/validation.md.
 
 The violations are measured on the reported shape and not taken from the solver: ω_ξ = η' · ζ by Eq. (14) from a spline
 through the frames, ω_η + ω_ζ β by Eq. (32) from the reported rates.
@@ -59,7 +59,7 @@ def geodesic(shape: fb.Equilibrium) -> NDArray[np.float64]:
 
 
 def misses(shape: fb.Equilibrium) -> Misses:
-    """How far a shape is from Eq. (25) and (32)."""
+    """The violations of Eq. (25) and (32) by a shape."""
     fields = (np.abs(geodesic(shape)), np.abs(shape.torsion + shape.bend * shape.rib_slope))
     return Misses(*(float(np.max(field[::step])) for field in fields for step in (NODES_PER_INTERVAL, 1)))
 
@@ -101,7 +101,7 @@ def end_row(penalty: float) -> list[str]:
 
 
 def reference(example: str) -> list[str]:
-    """The intrinsic method beside it."""
+    """The line of the intrinsic method."""
     shape = fb.solve(fb.load(ROOT / "scenarios" / f"{example}.toml"))
     position = vector(shape.highest_point.position, 3)
     return ["intrinsic method", "", number(shape.energy, 2), position, "0", "0", "0", "0"]

@@ -1,9 +1,9 @@
-"""Thin bands, shortened and sheared: where they snap on the way there and back, for docs/shear.md.
+"""Thin bands, shortened and sheared: where they snap on the way out and on the way back, for docs/shear.md.
 
     python benchmarks/shear.py
 
-A straight band between clamps, its far end 0.75 U away along y, is led along z to 0.4 U and back, in steps of a
-thousandth of its length.
+A straight band is held between clamps 0.75 U apart along y. Its far clamp moves along z to 0.4 U and back, in steps of
+a thousandth of the length of the band.
 """
 
 from __future__ import annotations
@@ -34,22 +34,22 @@ FALL = 0.02
 
 
 class Snap(NamedTuple):
-    """A place where the band snaps, and what energy that sets free."""
+    """A place where the band snaps, and the energy released there."""
 
     z: float
     fall: float
 
 
 class Swing(NamedTuple):
-    """What a band does that is led there and back; k steps either way."""
+    """A band along the way out and back; k steps either way."""
 
     z: Floats
     """Place of the far clamp, shape (2 k + 1,)."""
     energy: Floats
     height: Floats
-    """How far the highest point is along x."""
+    """Coordinate x of the highest point."""
     lost: float
-    """What is put in on the way and does not come back."""
+    """Energy dissipated: the work of the clamp less the change of the energy."""
     there: list[Snap]
     back: list[Snap]
 
@@ -61,13 +61,13 @@ def band(ratio: int, energy: str, per_width: int = PER_WIDTH) -> fb.Scenario:
 
 
 def diagram(ratio: int, energy: str) -> fb.Diagram:
-    """Its equilibria along the way there."""
+    """The equilibria of the band along the way out."""
     path = {"supports[1].position[2]": FARTHEST}
     return fb.follow(band(ratio, energy), path, states=1500, branches=4)
 
 
 def swing(ratio: int, energy: str, per_width: int = PER_WIDTH) -> Swing:
-    """The minimum that is followed there and back."""
+    """The minimum that a tracker follows out and back."""
     tracker = fb.Tracker(band(ratio, energy, per_width))
     there = np.linspace(0.0, FARTHEST, STEPS + 1)
     z = np.concatenate([there, there[-2::-1]])
@@ -77,7 +77,7 @@ def swing(ratio: int, energy: str, per_width: int = PER_WIDTH) -> Swing:
         states.append((tracker.energy, tracker.reaction("end").force[2], tracker.position[:, 0].max()))
     levels, force, height = np.array(states).T
     steps = np.diff(z)
-    # What the energy would be if nothing snapped, from the force before.
+    # Without a snap the energy changes by the work of the force.
     falls = levels[:-1] + force[:-1] * steps - levels[1:]
     snaps = [Snap(z[k + 1], falls[k]) for k in np.flatnonzero(falls > FALL)]
     turn = int(np.searchsorted(np.flatnonzero(falls > FALL), STEPS))
@@ -85,12 +85,12 @@ def swing(ratio: int, energy: str, per_width: int = PER_WIDTH) -> Swing:
     return Swing(z, levels, height, work - (levels[-1] - levels[0]), snaps[:turn], snaps[turn:])
 
 
-def told(snaps: list[Snap]) -> str:
-    """The largest of the snaps, and how many more there are."""
+def largest_of(snaps: list[Snap]) -> str:
+    """The largest of the snaps, and the number of smaller ones."""
     if not snaps:
         return "none"
     largest = max(snaps, key=lambda snap: snap.fall)
-    more = f" and {len(snaps) - 1} less" if len(snaps) > 1 else ""
+    more = f" and {len(snaps) - 1} smaller" if len(snaps) > 1 else ""
     return f"{number(largest.z, 3)} ({number(largest.fall, 2)}){more}"
 
 
@@ -103,7 +103,7 @@ def main() -> None:
             row = [f"1/{ratio}", f"`{energy}`"]
             for per_width in (PER_WIDTH, 2 * PER_WIDTH):
                 led = swing(ratio, energy, per_width)
-                row += [str(per_width * ratio), told(led.there), told(led.back), number(led.lost, 2)]
+                row += [str(per_width * ratio), largest_of(led.there), largest_of(led.back), number(led.lost, 2)]
             rows.append(row)
             print(" ".join(row), flush=True)
     write("snaps", table(header, rows), PAGE)

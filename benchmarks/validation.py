@@ -122,7 +122,7 @@ def cylinder_rows() -> Iterator[list[str]]:
 
 
 def published_rows() -> Iterator[list[str]]:
-    """Weight, closed belts: what is published or known, and ours on two meshes."""
+    """Weight, closed belts: published or exact values, and ours on two meshes."""
     for weight in (5.0, 20.0, 50.0):
         tables = heavy(weight, edgewise=False)
         sags = [-solve(tables, "wunderlich", elements).position[-1, 0] for elements in (80, 320)]
@@ -140,7 +140,7 @@ def _published(title: str, exact: float, found: list[float], decimals: int) -> l
 
 
 def heavy_sag(weight: float) -> float:
-    """How far the end of the heavy elastica hangs down: R_f a'' = −q (U − u) cos a, by collocation."""
+    """Sag of the end of the heavy elastica: R_f a'' = −q (U − u) cos a, by collocation."""
 
     def slope(u: Any, a: Any) -> Any:
         return np.stack([a[1], -weight * (1.0 - u) * np.cos(a[0]), np.sin(a[0])])
@@ -153,7 +153,7 @@ def heavy_sag(weight: float) -> float:
 
 
 def buckling_weight(elements: int) -> float:
-    """Weight at which the buckled state has no amplitude, of which the elastic energy is the square."""
+    """Weight at which the amplitude of the buckled state is 0; the elastic energy is its square."""
     weights = np.array([22.0, 22.5, 23.0, 24.0, 25.0])
     board = {"width": 0.02}
     squares = [
@@ -182,7 +182,7 @@ def gallery_rows() -> Iterator[list[str]]:
 
 
 def shape_rows() -> Iterator[list[str]]:
-    """The stable shapes of one board, those with a letter drawn."""
+    """The stable shapes of one board; those drawn have a letter."""
     letters = dict(zip(map(id, apart(shapes(), 5)), "abcde", strict=True))
     for shape in shapes():
         radius, margin = shape.least_spine_radius, shape.snap_margin(reach=0.3)
@@ -247,7 +247,7 @@ def _timing(title: str, tables: dict[str, Any]) -> list[str]:
 
 
 def processor() -> str:
-    """Name of the processor, as far as the system tells."""
+    """Name of the processor, or of its architecture where the system does not have it."""
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
     except OSError:

@@ -1,4 +1,4 @@
-"""How Sphinx makes a site of README.md, docs and the docstrings: `make docs`."""
+"""Configuration of Sphinx for the site of README.md, docs and the docstrings: `make docs`."""
 
 from __future__ import annotations
 
@@ -82,13 +82,13 @@ FIELD_OF_TUPLE = re.compile(r"Alias for field number \d+")
 
 
 def add_tree(_app: Sphinx, name: str, source: list[str]) -> None:
-    """Appends the tree of pages to the landing page, which does without one in the repository."""
+    """Appends the tree of pages to the landing page, which has no tree in the repository."""
     if name == root_doc:
         source[0] += TREE
 
 
 def mark_up(_app: Sphinx, _what: str, _name: str, _object: object, _options: object, lines: list[str]) -> None:
-    """Makes fields of the lines of a docstring that begin with `Shapes:` and the like; bars are no markup."""
+    """Makes fields of the lines of a docstring that begin with a `LABEL`; escapes bars."""
     is_field = False
     for index, line in enumerate(lines):
         marked = "" if FIELD_OF_TUPLE.fullmatch(line) else line.replace("|", r"\|")
@@ -105,7 +105,7 @@ def mark_up(_app: Sphinx, _what: str, _name: str, _object: object, _options: obj
 def hide_core(
     _app: Sphinx, what: str, _name: str, _object: object, _options: object, signature: str | None, _returns: str | None
 ) -> tuple[str, None] | None:
-    """Hides how objects are made that only the package makes."""
+    """Hides the constructors of objects that only the package makes."""
     return ("", None) if what == "class" and "_core." in (signature or "") else None
 
 

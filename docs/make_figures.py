@@ -60,7 +60,7 @@ GALLERY = {
     "polystyrene": VIEWER,
     "twist": VIEWER,
 }
-"""The shipped scenarios, and from where each is seen."""
+"""The shipped scenarios, with the direction of view of each."""
 SPLIT: dict[bool, dict[str, Any]] = {True: {"height_ratios": (5.0, 1.0)}, False: {"width_ratios": (2.0, 1.0)}}
 UP = np.array([1.0, 0.0, 0.0])
 VIEW = np.array([0.38, 0.6, -0.7]) / np.linalg.norm([0.38, 0.6, -0.7])
@@ -100,14 +100,14 @@ def examples() -> Figure:
 
 
 def box(shape: fb.Equilibrium) -> tuple[Floats, Floats]:
-    """Corners of the belt on the page, with room for the clamps."""
+    """Corners of the belt on the page, with a margin for the clamps."""
     points = page(np.concatenate(shape.edges))
     margin = np.array([0.07, 0.03])
     return points.min(axis=0) - margin, points.max(axis=0) + margin
 
 
 def draw_belt(axes: Axes, shape: fb.Equilibrium) -> None:
-    """A belt on the page, what is near over what is far."""
+    """A belt on the page, near parts over far parts."""
     normals = 0.5 * (shape.frame[1:, :, 0] + shape.frame[:-1, :, 0])
     light = np.array([0.8, 0.5, 0.1]) / np.linalg.norm([0.8, 0.5, 0.1])
     shades = 0.68 + 0.3 * np.abs(normals @ light)
@@ -144,7 +144,7 @@ def page(points: Floats) -> Floats:
 
 
 def gallery(name: str) -> Figure:
-    """A shipped scenario, bent and flat: the flat board below where it is long, else beside."""
+    """A shipped scenario, bent and flat: the flat board below if it is long, else beside."""
     shape = fb.solve(fb.load(ROOT / "scenarios" / f"{name}.toml"), strict=True)
     outline = np.concatenate(shape.outline().loops)
     is_long = np.ptp(outline[:, 1]) < 0.3 * np.ptp(outline[:, 0])
@@ -225,7 +225,7 @@ def slope_mark(axes: Axes, order: int, span: tuple[float, float], height: float)
 
 
 def bound() -> Figure:
-    """Where the ribs of example 1 sit on the bound."""
+    """The parts of example 1 where ribs are at the bound."""
     figure = Figure(figsize=(WIDTH, 2.7), layout="constrained")
     slope, rate = figure.subplots(1, 2)
     for energy in ENERGIES:
@@ -264,7 +264,7 @@ def bend_radius() -> Figure:
 
 
 def continuation() -> Figure:
-    """A strut under thrust, its far end held square and sliding: how it buckles, and what branches off."""
+    """A strut under thrust, its far end held square and sliding: its buckling and its branches."""
     tables = fb.load(ROOT / "scenarios" / "planar.toml").to_dict() | {"name": "A strut under thrust"}
     tables["supports"][1]["position"] = [0.0, "free", 0.0]
     tables["loads"] = {"points": [{"at": "end", "force": [0.0, -1.0, 0.0]}]}
@@ -272,7 +272,7 @@ def continuation() -> Figure:
 
 
 def shear_diagrams() -> Figure:
-    """Height of sheared bands: their equilibria, and what they do when they are led there and back."""
+    """Height of sheared bands: their equilibria, and the minima of a tracker on the way out and back."""
     figure = Figure(figsize=(WIDTH, 8.6), layout="constrained")
     rows = figure.subplots(len(shear.RATIOS), len(ENERGIES), sharex=True, sharey="row")
     ways = (("there", slice(None, shear.STEPS + 1), "0.78", 5.0), ("back", slice(shear.STEPS, None), "0.55", 2.2))
@@ -370,7 +370,7 @@ def main() -> None:
 
 
 def save(figure: Figure, name: str) -> None:
-    """Writes a picture and says how large it is."""
+    """Writes a picture and prints its size."""
     path = FIGURES / f"{name}.png"
     figure.savefig(path, metadata={"Software": None}, bbox_inches="tight" if name.startswith("gallery") else None)
     print(f"{path.relative_to(ROOT)}: {path.stat().st_size // 1024} kB")

@@ -50,7 +50,7 @@ def drop(path: str) -> Change:
 
 
 def several(*changes: Change) -> Change:
-    """One after the other."""
+    """Several changes, one after the other."""
 
     def change(scenario: Json) -> None:
         for one in changes:

@@ -47,7 +47,7 @@ class Expected:
 
     @property
     def component(self) -> int:
-        """Of the pose: the one that varies."""
+        """Index of the component of the pose that varies."""
         return int(np.flatnonzero(self.direction)[0])
 
 

@@ -49,7 +49,7 @@ def support(
     rotation: Any = None,
     square_rib: bool | None = None,
 ) -> Json:
-    """One `[[supports]]` table; what is None is left out, that is: free, or the default."""
+    """One `[[supports]]` table; fields that are None are left out: free, or the default."""
     table: Json = {"at": at}
     if position is not None:
         table["position"] = numbers(position)
@@ -70,7 +70,7 @@ def belt(
     elements: int | None = None,
     bulge: Any = None,
 ) -> Json:
-    """A straight belt held by `supports`; what is None is left to the package's default."""
+    """A straight belt held by `supports`; fields that are None have the package's default."""
     board: Json = {"width": width, "segments": [{"kind": "straight", "length": length}]}
     if rigidity is not None:
         board["rigidity"] = rigidity
@@ -478,7 +478,7 @@ def total_length(scenario: Json) -> float:
 
 
 def place(scenario: Json, at: str | float) -> float:
-    """The arc length of a place that may be called "start" or "end"."""
+    """The arc length of a place: a number, "start" or "end"."""
     if isinstance(at, str):
         return {"start": 0.0, "end": total_length(scenario)}[at]
     return float(at)
@@ -532,7 +532,7 @@ def spine_integrals(equilibrium: fb.Equilibrium) -> Array:
 
 
 def load_points(equilibrium: fb.Equilibrium, scenario: Json) -> list[tuple[float, Array, Array]]:
-    """Place, force and where it acts, x + Rℓ, of the loads at points."""
+    """Place, force and point of application x + Rℓ of the point loads."""
     loads = []
     for point in scenario.get("loads", {}).get("points", []):
         u = place(scenario, point["at"])
@@ -548,7 +548,7 @@ def gravity_of(scenario: Json) -> Array:
 
 
 def mass_per_length(equilibrium: fb.Equilibrium, scenario: Json) -> float:
-    """`density`, or else what the potential of the result implies: of presets the tests know no numbers."""
+    """`density`, or else what the potential of the result implies: the tests have no numbers of presets."""
     gravity = gravity_of(scenario)
     if not np.any(gravity):
         return 0.0
@@ -575,7 +575,7 @@ def wrench(force: Array, acts_at: Array, moment: Any = ORIGIN) -> Array:
 
 
 def applied_wrenches(equilibrium: fb.Equilibrium, scenario: Json) -> list[tuple[float, Array]]:
-    """Place and wrench about the origin of all that acts on the belt at points: supports, links, loads.
+    """Place and wrench about the origin of all supports, links and point loads.
 
     A link acts with its force at `to` and against it at `from`.
     """
@@ -594,7 +594,7 @@ def applied_wrenches(equilibrium: fb.Equilibrium, scenario: Json) -> list[tuple[
 
 
 def weight_beyond(equilibrium: fb.Equilibrium, scenario: Json) -> Array:
-    """Wrench about the origin of the weight of what lies beyond every node.
+    """Wrench about the origin of the weight of the belt beyond every node.
 
     Shapes: (n, 6)
     """

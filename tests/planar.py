@@ -1,4 +1,4 @@
-"""Equilibria of the planar inextensible elastica between two clamps: a reference that knows nothing of the package.
+"""Equilibria of the planar inextensible elastica between two clamps: a reference independent of the package.
 
 Length 1, rigidity 1. The belt leaves the origin along +y; at arc length u its tangent is (−sin ϑ, cos ϑ), its bend ϑ',
 with ϑ(0) = 0. A pose (x, y, a) is where it ends and ϑ(1) = a, whole turns counted. With the force (X, Y) on the belt of
@@ -39,9 +39,9 @@ Array = npt.NDArray[np.float64]
 MODES = 80
 POINTS = 112
 NEWTON = 1e-14
-"""Largest residual of an equilibrium, of its force and a hundred more: what rounding leaves."""
+"""Largest residual of an equilibrium, relative to its force plus 100: the rounding error."""
 FORCE_SCALE = 4.0 * math.pi**2
-"""Of the force beside the coefficients in the length of a branch."""
+"""Weight of the force beside the coefficients in the length of a branch."""
 RESOLVED = 1e-5
 """Largest of the last coefficients of a shape that is followed: functionals of it are off by about its square."""
 TURNS_WITHIN = 1e-3
@@ -53,7 +53,7 @@ ALONG_Y = np.array([0.0, 1.0, 0.0])
 
 
 class NoEquilibriumError(ArithmeticError):
-    """Newton's method came to nothing."""
+    """Newton's method has not converged."""
 
 
 # --------------------------------------------------------------------------------------------------------- basis
@@ -122,7 +122,7 @@ class Planar:
 
     @functools.cached_property
     def _stiffening(self) -> Array:
-        """−X sin ϑ + Y cos ϑ at the Gauss points: what the force adds to the second variation."""
+        """−X sin ϑ + Y cos ϑ at the Gauss points: the term of the force in the second variation."""
         sine, cosine = self._trigonometry
         return np.asarray(self.force[1] * cosine - self.force[0] * sine, dtype=np.float64)
 
@@ -139,7 +139,7 @@ class Planar:
 
     @property
     def rounding(self) -> float:
-        """What `residual` has to be below."""
+        """The bound on `residual`."""
         return NEWTON * (100.0 + float(np.linalg.norm(self.force)))
 
     @property
@@ -225,7 +225,7 @@ class Planar:
 
     @property
     def height(self) -> float:
-        """The farthest along +x."""
+        """The point farthest along +x."""
         u = np.linspace(0.0, 1.0, 401)
         sine = np.sin(self.angle(u))
         stationary = [
@@ -236,11 +236,11 @@ class Planar:
 
     @property
     def negative_modes(self) -> int:
-        """Of the Hessian where the end is held: as many as the matrix has, less one for each constraint."""
+        """Number of negative modes with the end held: that of the matrix, less one for each constraint."""
         return int(np.sum(np.linalg.eigvalsh(self.matrix) < 0.0)) - 2
 
     def mirrored(self) -> Planar:
-        """x → −x."""
+        """The mirror image, x → −x."""
         return Planar(self.pose * [-1.0, 1.0, -1.0], -self.coefficients, self.force * [-1.0, 1.0])
 
 
@@ -293,7 +293,7 @@ def buckled(distance: float, mode: int = 1) -> Planar:
 
 @dataclass(frozen=True)
 class Branch:
-    """Equilibria whose end is at base + λ · direction, followed by pseudo-arclength as the first step goes.
+    """Equilibria whose end is at base + λ · direction, followed by pseudo-arclength in the direction of the first step.
 
     The length counts the coefficients, the force in `FORCE_SCALE`, and λ.
     """
@@ -307,7 +307,7 @@ class Branch:
     )
 
     def tangent(self, at: Planar, before: Array) -> Array:
-        """The unit tangent (dc, dX, dY, dλ) that goes on as the one before.
+        """The unit tangent (dc, dX, dY, dλ) in the direction of the tangent before.
 
         Shapes: (MODES + 3,)
         """
@@ -316,7 +316,7 @@ class Branch:
         return np.asarray(tangent / math.sqrt(tangent @ (self.metric * tangent)), dtype=np.float64)
 
     def _correct(self, predicted: Planar, tangent: Array) -> Planar:
-        """Newton's method square to the tangent."""
+        """Newton's method perpendicular to the tangent."""
         found = predicted
         for _ in range(7):
             residual = found.residual
@@ -328,7 +328,7 @@ class Branch:
         raise NoEquilibriumError(f"near {predicted.pose}")
 
     def points(self) -> Iterator[tuple[Planar, Array]]:
-        """Equilibria and the branch's tangents there, the start first, for as long as there are modes enough."""
+        """Equilibria and tangents of the branch, from the start as long as the modes resolve the shape."""
         at, step = self.start, self.step
         tangent = self.tangent(at, np.append(np.zeros(MODES + 2), 1.0))
         yield at, tangent
@@ -351,7 +351,7 @@ class Branch:
 
 
 def between(before: Planar, after: Planar, share: float) -> Planar:
-    """The shape in the given share of the way, no equilibrium."""
+    """The shape at a share of the way, not an equilibrium."""
     return Planar(
         before.pose + share * (after.pose - before.pose),
         before.coefficients + share * (after.coefficients - before.coefficients),
@@ -360,7 +360,7 @@ def between(before: Planar, after: Planar, share: float) -> Planar:
 
 
 def at_parameter(start: Planar, direction: Array, parameter: float, *, longest: float = 0.4) -> Planar:
-    """The equilibrium at start + λ · direction, λ > 0, where the branch gets there before it turns back."""
+    """The equilibrium at start + λ · direction, λ > 0, if the branch reaches it before it turns back."""
     before = start
 
     def reached(at: Planar) -> float:
@@ -375,7 +375,7 @@ def at_parameter(start: Planar, direction: Array, parameter: float, *, longest: 
         before = at
     if longest < TURNS_WITHIN:
         raise NoEquilibriumError(f"the branch turns back before {start.pose + parameter * direction}")
-    # It may have turned further on than here.
+    # The branch may turn back beyond this point.
     return at_parameter(before, direction, parameter - reached(before), longest=longest / 8.0)
 
 
@@ -384,7 +384,7 @@ def at_parameter(start: Planar, direction: Array, parameter: float, *, longest: 
 
 @dataclass(frozen=True)
 class Fold:
-    """Where a branch turns back: the equilibrium, the null vector of its matrix, and the branch's points about it."""
+    """A fold: its equilibrium, the null vector of its matrix, and the points of the branch around it."""
 
     state: Planar
     null: Array
@@ -430,7 +430,7 @@ def folds(start: Planar, direction: Array, *, turns: float = 0.5, reach: float =
         if tangent[-1] * tangent_before[-1] < 0.0:
             if before.negative_modes == at.negative_modes:
                 return
-            # The null vector is the tangent where λ stands still.
+            # The null vector is the tangent where dλ = 0.
             share = tangent_before[-1] / (tangent_before[-1] - tangent[-1])
             null = (1.0 - share) * tangent_before[:-1] + share * tangent[:-1]
             yield Fold(*converge_fold(between(before, at, share), null, direction), before, at)
@@ -443,7 +443,7 @@ def pitchfork(distance: float) -> Planar:
     """Where the two arches with the end at (x, d) and no turn meet the S between them: a mode of the S passes 0.
 
     Half a turn of the plane about the belt's middle maps the S to itself and the arches to each other. Beyond, x being
-    larger, the S is the only one of the three and stable. The twin at −x is the mirror image.
+    larger, the S is the only one of the three and stable. The arch at −x is the mirror image of that at +x.
     """
     before = buckled(distance, mode=2).mirrored()
     for at, tangent in Branch(before, ALONG_X).points():
@@ -538,7 +538,7 @@ class Shot:
 
         u = np.linspace(first, 1.0, 400)
         values = np.array([determinant(at) for at in u])
-        # What is 0 at the end itself belongs to a fold.
+        # A zero at the end itself belongs to a fold.
         inside = np.flatnonzero(values[:-1] * values[1:] < 0.0)
         return np.array([brentq(determinant, u[i], u[i + 1], xtol=1e-13) for i in inside])
 

@@ -96,7 +96,7 @@ def test_internal_moment_changes_by_the_lever_of_the_force(energy: Energy, name:
 @energy_model
 @cases
 def test_support_at_the_end_is_what_lies_beyond_it(energy: Energy, name: str) -> None:
-    """At u = U the part before is the whole belt and what is beyond is the support."""
+    """At u = U the part before u is the whole belt, and only the support is beyond u."""
     equilibrium = solve(CASES[name](energy))
     force, moment = internal(equilibrium)
     wrench = end_wrench(equilibrium, "end")
@@ -129,7 +129,7 @@ def test_reactions_hold_the_belt_in_balance(energy: Energy, name: str) -> None:
 
 @energy_model
 def test_reactions_are_those_of_the_result(energy: Energy) -> None:
-    """`reaction(at)` and `supports[]` say the same, in the order of the scenario's supports."""
+    """`reaction(at)` and `supports[]` agree, in the order of the scenario's supports."""
     equilibrium = solve(generic(energy))
     supports = result(equilibrium)["supports"]
     assert [s["at"] for s in supports] in (["start", "end"], [0.0, 1.0])
@@ -284,7 +284,7 @@ def test_slide_takes_no_force_along_itself() -> None:
 @energy_model
 @pytest.mark.parametrize("name", ["generic", "example1", "example2"])
 def test_ribs_are_square_at_clamps(energy: Energy, name: str) -> None:
-    """Eq. (45), (46), (50): β = 0 at an end with both position and rotation, unless told otherwise."""
+    """Eq. (45), (46), (50): β = 0 at an end with both position and rotation, by default."""
     slope = solve(CASES[name](energy)).rib_slope
     assert abs(slope[0]) < 1e-8
     assert abs(slope[-1]) < 1e-8
@@ -301,7 +301,7 @@ def test_rib_at_a_pinned_end_is_free(energy: Energy) -> None:
 
 
 def test_rib_at_a_pinned_end_leans_with_the_twist() -> None:
-    """The other energies have no say there: no moment, so no bend, so a rib costs nothing whichever way it points."""
+    """With the other energies the rib is not determined: no moment, so no bend, so its slope costs no energy."""
     assert abs(solve(pinned_end("wunderlich", (0.05, 0.6, 0.2))).rib_slope[-1]) > 1e-3
 
 

@@ -43,7 +43,7 @@ from helpers import (
 )
 
 SCENARIOS = sorted((Path(__file__).parent.parent / "scenarios").glob("*.toml"))
-# Of the largest force times the length, or moment; what the solver's tolerance of 1e-8 leaves.
+# Relative to the largest moment, or force times the length: the error of the solver's tolerance of 1e-8.
 BALANCE_ERROR = 1e-7
 
 START = support("start", ORIGIN, ORIGIN)
@@ -141,7 +141,7 @@ def assert_in_balance(equilibrium: fb.Equilibrium, scenario: Json) -> None:
 
 
 def beyond(equilibrium: fb.Equilibrium, scenario: Json, *, here: bool) -> Array:
-    """Wrench about the origin of all that acts beyond every node; what acts at the node itself counts if `here`.
+    """Wrench about the origin of all forces beyond every node; forces at the node itself count if `here`.
 
     Shapes: (n, 6)
     """
@@ -155,7 +155,7 @@ def beyond(equilibrium: fb.Equilibrium, scenario: Json, *, here: bool) -> Array:
 
 
 def assert_node_by_node(equilibrium: fb.Equilibrium, scenario: Json) -> None:
-    """What acts at an end is beyond the end and before the start; inside, a node is on either side of it."""
+    """A force at the end is beyond it, a force at the start before it; inside, nodes lie on either side of a force."""
     actual = internal_wrenches(equilibrium)
     errors = [
         np.max(np.abs(in_units_of(actual - beyond(equilibrium, scenario, here=here), scenario)), axis=1)
@@ -169,7 +169,7 @@ def assert_node_by_node(equilibrium: fb.Equilibrium, scenario: Json) -> None:
 
 @any_case
 def test_belt_is_in_balance(name: str) -> None:
-    """Supports, links, loads and weight: no force and no moment left over."""
+    """Forces and moments of supports, links, loads and weight sum to zero."""
     scenario = scenario_of(name)
     assert_in_balance(solve(scenario), scenario)
 

@@ -1,4 +1,4 @@
-"""Many solves at once: the same results as one by one, in their order, and a failure among them is a value."""
+"""Many solves at once: the same results as one by one, in their order, and a failed solve among them is a value."""
 
 from __future__ import annotations
 
@@ -44,11 +44,11 @@ def test_nothing_gives_nothing() -> None:
 
 
 def test_progress_rises_to_all() -> None:
-    told: list[tuple[int, int]] = []
+    calls: list[tuple[int, int]] = []
     scenarios = several()
-    fb.solve_many(scenarios, progress=lambda solved, total: told.append((solved, total)))
-    assert told == sorted(told)
-    assert told[-1] == (len(scenarios), len(scenarios))
+    fb.solve_many(scenarios, progress=lambda solved, total: calls.append((solved, total)))
+    assert calls == sorted(calls)
+    assert calls[-1] == (len(scenarios), len(scenarios))
 
 
 def test_error_in_progress_ends_the_solves() -> None:

@@ -41,7 +41,7 @@ def assert_one_line(err, *parts):
         assert str(part) in err
 
 
-def test_the_table_tells_what_people_ask_for(run, example_file):
+def test_the_table_shows_energy_extremes_and_reactions(run, example_file):
     code, out, err = run("solve", example_file)
     assert (code, err) == (0, "")
     for quantity in (
@@ -59,7 +59,7 @@ def test_the_table_tells_what_people_ask_for(run, example_file):
         assert f"moment on the belt, {place}" in out
 
 
-def test_the_table_tells_of_loads_links_and_hinges(run, example):
+def test_the_table_shows_loads_links_and_hinges(run, example):
     tables = example.to_dict()
     tables["belt"]["density"] = 1.0
     tables["supports"][1] |= {"hinge": "zeta"}
@@ -165,7 +165,7 @@ def test_no_equilibrium_is_still_json_for_machines(run, out_of_reach_file):
 
 
 @pytest.mark.parametrize("package", ["matplotlib", "trimesh"])
-def test_a_missing_package_is_said_before_the_solve(run, monkeypatch, example_file, package):
+def test_a_missing_package_is_reported_before_the_solve(run, monkeypatch, example_file, package):
     module, option = {"matplotlib": ("plot", "--figure"), "trimesh": ("export", "--mesh")}[package]
     monkeypatch.delitem(sys.modules, f"fishbone.{module}", raising=False)
     monkeypatch.delattr(fb, module, raising=False)
@@ -316,22 +316,22 @@ def test_nothing_is_written_where_a_picture_cannot_be_made(run, monkeypatch, exa
 
 
 @pytest.fixture
-def told(monkeypatch, arches):
-    """Gives the equilibria of the planar arch for whatever is asked, at no search; what is told of the search."""
-    told = []
+def searches(monkeypatch, arches):
+    """Replaces the search by the equilibria of the planar arch; returns the `progress` of each call."""
+    searches = []
 
     def branches(scenario, *, progress):
-        told.append(progress)
+        searches.append(progress)
         if progress is not None:
             progress(1, 2)
         return arches
 
     monkeypatch.setattr(fb, "branches", branches)
-    return told
+    return searches
 
 
 def test_all_is_an_array_of_what_branches_finds_byte_for_byte(run, monkeypatch, mirrored, mirrored_arches, search):
-    """A search of its own: the same twice."""
+    """A second search finds the same equilibria."""
     monkeypatch.setattr(fb, "branches", search)
     Path("mirrored.json").write_text(json.dumps(mirrored.to_dict()), "utf-8")
     code, out, err = run("solve", "mirrored.json", "--all", "--json", "--out", "a.json")
@@ -345,7 +345,7 @@ def test_all_is_an_array_of_what_branches_finds_byte_for_byte(run, monkeypatch, 
     assert json.dumps(found) == json.dumps(expected)
 
 
-def test_all_has_a_row_for_each_equilibrium(run, planar_file, told, arches):
+def test_all_has_a_row_for_each_equilibrium(run, planar_file, searches, arches):
     code, out, err = run("solve", planar_file, "--all")
     assert (code, err) == (0, "")
     assert all(len(line) <= 80 for line in out.splitlines())
@@ -365,7 +365,7 @@ def test_all_has_a_row_for_each_equilibrium(run, planar_file, told, arches):
     assert [row[8] for row in rows] == ["no" if one.crosses_itself is None else "yes" for one in arches]
 
 
-def test_all_is_drawn_on_one_page(run, planar_file, told, arches):
+def test_all_is_drawn_on_one_page(run, planar_file, searches, arches):
     code, _, _ = run("solve", planar_file, "--all", "--figure", "a.png", "--out", "a.json")
     assert code == 0
     assert sorted(path.name for path in Path().iterdir()) == ["a.json", "a.png"]
@@ -389,7 +389,7 @@ def test_all_without_any_is_exit_3_with_a_result_and_no_picture(run, out_of_reac
     assert only["status"] == "infeasible"
 
 
-def test_all_writes_nothing_where_a_picture_cannot_be_made(run, monkeypatch, planar_file, told):
+def test_all_writes_nothing_where_a_picture_cannot_be_made(run, monkeypatch, planar_file, searches):
     def fail(*_):
         raise fb.FishboneError("no picture")
 
@@ -411,14 +411,14 @@ def test_all_passes_every_warning_on_once(run, monkeypatch, example):
     assert_one_line(err, "coarse.json", "warning", "80")
 
 
-def test_all_shows_its_progress_on_a_terminal_only(run, monkeypatch, planar_file, told):
+def test_all_shows_its_progress_on_a_terminal_only(run, monkeypatch, planar_file, searches):
     assert run("solve", planar_file, "--all")[2] == ""
     monkeypatch.setenv("FORCE_COLOR", "1")
     err = run("solve", planar_file, "--all")[2]
     assert "searching" in err
     assert "50%" in err
-    assert told[0] is None
-    assert told[1] is not None
+    assert searches[0] is None
+    assert searches[1] is not None
 
 
 def test_control_c_ends_all_with_exit_130_and_one_line(planar_file, tmp_path):
@@ -446,7 +446,7 @@ def planar_file(example_file):
 TURN = ("--to", "supports[1].rotation[2]=-1.5")
 
 
-def test_follow_tells_of_branches_and_events(run, planar_file):
+def test_follow_prints_branches_and_events(run, planar_file):
     code, out, err = run("follow", planar_file, *TURN)
     assert (code, err) == (0, "")
     for words in ("supports[1].rotation[2]", "with the path", "fold", "-1.1231", "0 → 1", "26.344", "10.042"):
@@ -454,13 +454,13 @@ def test_follow_tells_of_branches_and_events(run, planar_file):
     assert all(len(line) <= 80 for line in out.splitlines())
 
 
-def test_follow_without_events_says_so(run, planar_file):
+def test_follow_prints_that_there_are_no_events(run, planar_file):
     code, out, _ = run("follow", planar_file, "--to", "supports[1].rotation[2] = 0.2")
     assert code == 0
     assert "no events" in out
 
 
-def test_follow_says_where_a_branch_ends_short_of_the_path(run, planar_file):
+def test_follow_prints_where_a_branch_ends_short_of_the_path(run, planar_file):
     code, out, _ = run("follow", planar_file, *TURN, "--states", "10")
     assert code == 0
     assert "branch 0 has used up its states" in out
@@ -514,7 +514,7 @@ def test_follow_leads_several_numbers_a_list_or_poses(run, planar_file):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "words"),
     [
         ((), "neither --to nor --pose"),
         (("--to", "belt.width=0.2", "--pose", "0 0 0 0 0 0"), "--to and --pose"),
@@ -542,11 +542,11 @@ def test_follow_leads_several_numbers_a_list_or_poses(run, planar_file):
         (("--to", "belt.width=0.2", "--figure", "nowhere/a.png"), "nowhere"),
     ],
 )
-def test_wrong_use_of_follow_is_exit_2_and_one_line_before_any_solve(run, monkeypatch, planar_file, arguments, said):
+def test_wrong_use_of_follow_is_exit_2_and_one_line_before_any_solve(run, monkeypatch, planar_file, arguments, words):
     monkeypatch.setitem(fb.follow.__globals__, "solve", lambda _: pytest.fail("solved"))
     code, out, err = run("follow", planar_file, *arguments)
     assert (code, out) == (2, "")
-    assert_one_line(err, said)
+    assert_one_line(err, words)
 
 
 def test_a_support_that_is_not_there_is_exit_2(run, planar_file):
@@ -592,19 +592,19 @@ def test_follow_misses_matplotlib_before_the_solve(run, monkeypatch, planar_file
 
 
 def test_follow_shows_its_progress_on_a_terminal_only(run, monkeypatch, planar_file):
-    told = []
+    calls = []
     follow = fb.follow
 
     def spy(*arguments, progress, **settings):
-        told.append(progress)
+        calls.append(progress)
         return follow(*arguments, progress=progress, **settings)
 
     monkeypatch.setattr(fb, "follow", spy)
     assert run("follow", planar_file, *TURN)[2] == ""
     monkeypatch.setenv("FORCE_COLOR", "1")
     assert "branch 0" in run("follow", planar_file, *TURN)[2]
-    assert told[0] is None
-    assert told[1] is not None
+    assert calls[0] is None
+    assert calls[1] is not None
 
 
 def test_control_c_ends_follow_with_exit_130_and_one_line(planar_file, tmp_path):

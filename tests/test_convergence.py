@@ -37,7 +37,7 @@ ORDER_WHERE_THE_BOUND_IS_INACTIVE = (3.4, 4.6)
 ENERGY_ORDER_WHERE_THE_BOUND_IS_ACTIVE = (1.6, 3.2)
 POSITION_ORDER_WHERE_THE_BOUND_IS_ACTIVE = (1.0, 3.2)
 
-# Below these differences the solver's tolerance shows, not the mesh.
+# Below these differences the tolerance of the solver dominates, not the mesh.
 LEAST_ENERGY_DIFFERENCE = 1e-7
 LEAST_POSITION_DIFFERENCE = 5e-8
 

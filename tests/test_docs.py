@@ -1,4 +1,4 @@
-"""What README.md and docs point at exists."""
+"""Links, tests and files named in README.md and docs exist."""
 
 from __future__ import annotations
 

@@ -175,7 +175,7 @@ def test_energy_converges_with_the_fourth_order(distance: float) -> None:
 
 @pytest.mark.parametrize("distance", [0.3, 0.6, 0.9])
 def test_spine_converges_with_the_fourth_order(distance: float) -> None:
-    """The nodes against the closed form; 80 elements are left out, where the solver's tolerance shows."""
+    """The nodes against the closed form; 80 elements are left out, where the tolerance of the solver dominates."""
     elastica = Elastica(distance)
     errors = []
     for elements in (10, 20, 40):

@@ -1,4 +1,4 @@
-"""What is raised: its class, its one line, and its data, which are not to be read out of the line."""
+"""Errors: their class, their one line, and their data as attributes."""
 
 import copy
 import os
@@ -16,7 +16,7 @@ BELT = {"width": 0.1, "rigidity": 1.0, "segments": [{"kind": "straight", "length
 START = {"at": "start", "position": ORIGIN, "rotation": ORIGIN}
 END = {"at": "end", "position": [0.0, 0.6, 0.1], "rotation": ORIGIN}
 PIN = {"at": "end", "position": [0.0, 0.6, 0.1]}
-TAUT = END | {"position": [0.0, 1.0, 0.0]}
+NO_SLACK = END | {"position": [0.0, 1.0, 0.0]}
 TOO_FAR = END | {"position": [0.0, 2.0, 0.0]}
 TURN = "supports[1].rotation[2]"
 AWAY = fb.Poses([([0.0, 0.7, 0.0], ORIGIN)])
@@ -39,7 +39,7 @@ def bent():
 
 
 def apart():
-    """What the solve says of supports that are too far apart."""
+    """The message of a solve whose supports are too far apart."""
     return solved(START, TOO_FAR).message
 
 
@@ -64,7 +64,7 @@ def read(text):
     return fb._core.Scenario.from_toml(text)
 
 
-# Class, what raises it, and its data: all that it has, and no more.
+# Class of the error, a call that raises it, and all its data.
 CASES = {
     "syntax": (
         fb.InvalidScenario,
@@ -139,7 +139,7 @@ CASES = {
     "sensitivity of no minimum": (fb.NoSensitivity, lambda: strut(90.0).sensitivity(), {"reason": "saddle"}),
     "sensitivity without slack": (
         fb.NoSensitivity,
-        lambda: solved(START, TAUT).sensitivity().jacobian(1),
+        lambda: solved(START, NO_SLACK).sensitivity().jacobian(1),
         {"reason": "no_slack"},
     ),
     "sensitivity of redundant supports": (
@@ -215,7 +215,7 @@ CASES = {
 
 @pytest.fixture(params=CASES)
 def case(request, monkeypatch, tmp_path):
-    """An exception, its class, and what its data should be."""
+    """An exception, its class, and its expected data."""
     monkeypatch.chdir(tmp_path)
     kind, raising, data = CASES[request.param]
     with pytest.raises(fb.FishboneError) as raised:

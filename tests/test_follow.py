@@ -1,4 +1,4 @@
-"""Equilibria along a path: events where independent references have them, energies that change as the reactions say."""
+"""Equilibria along a path: events against independent references, changes of energy against the work of reactions."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def buckling() -> fb.Diagram:
 
 @pytest.fixture(scope="module")
 def sheared() -> fb.Diagram:
-    """An arch whose end is moved aside: ribs lean, and it folds in plenty."""
+    """An arch whose end moves sideways: its ribs lean, and its branch has many folds."""
     return fb.follow(arch(), {"supports[1].position[2]": 0.25}, branches=1)
 
 
@@ -71,7 +71,7 @@ def test_fold_is_where_the_planar_reference_has_it(expected):
     assert fold.parameter == pytest.approx(expected.parameter, abs=1e-4)
     assert branch.energy[fold.state] == pytest.approx(expected.energy, rel=1e-4)
     assert branch.height[fold.state] == pytest.approx(expected.height, abs=1e-4)
-    # Until then the belt gives way out of its plane nowhere: what there is, is of the plane.
+    # Before the fold the belt does not lose its stability out of its plane: all events are planar.
     earlier = branch.events[: branch.events.index(fold)]
     assert len(earlier) == expected.modes[0]
     for event in earlier:
@@ -281,7 +281,7 @@ def test_arrays_have_the_documented_shapes_and_belong_to_the_caller(turned):
 
 
 def test_where_nothing_bends_no_radius_is_a_number():
-    # Not all flat belts are exactly flat: what is not NaN is very large.
+    # Not all flat belts are exactly flat: radii that are not NaN are very large.
     radii = fb.follow(strut(), {PUSH: -2.0}, branches=1).branches[0].least_spine_radius
     assert np.all(np.isnan(radii) | (radii > 1e9))
 
@@ -353,7 +353,7 @@ def test_a_belt_without_supports_is_followed():
     assert not [name for name in diagram.table() if name.startswith("supports")]
 
 
-def test_a_branch_says_why_it_ends():
+def test_a_branch_has_the_reason_of_its_end():
     short = fb.follow(arch(), {ANGLE: -1.5}, states=10).branches[0]
     assert (len(short), short.end) == (10, "budget")
     assert fb.follow(arch(), {ANGLE: -0.5}).branches[0].end == "range"
@@ -384,7 +384,7 @@ def snapped_energy(event: fb.Event) -> float | None:
 # ----------------------------------------------------------------------------------------------------- exports
 
 
-def test_the_dict_says_what_the_branches_say(turned):
+def test_the_dict_has_the_numbers_of_the_branches(turned):
     tables = turned.to_dict()
     assert json.loads(json.dumps(tables, allow_nan=False)) == tables
     assert tables["schema"] == "fishbone.diagram/1"
@@ -404,7 +404,7 @@ def test_the_dict_says_what_the_branches_say(turned):
     assert {state["result"]["schema"] for state in branch["states"]} == {"fishbone.result/1"}
 
 
-def test_the_dict_says_where_branches_begin(buckling):
+def test_the_dict_has_the_origins_of_branches(buckling):
     origins = [branch["origin"] for branch in buckling.to_dict()["branches"]]
     assert origins[:2] == [None, {"branch": 0, "event": 0}]
 
@@ -432,7 +432,7 @@ def test_repr_is_one_short_line(turned):
 
 
 @pytest.mark.parametrize(
-    ("path", "error", "said"),
+    ("path", "error", "words"),
     [
         ({}, fb.NoPath, "found nothing that changes"),
         ({"supports[1].position[1]": 0.6}, fb.NoPath, "found nothing that changes"),
@@ -457,8 +457,8 @@ def test_repr_is_one_short_line(turned):
         (fb.Poses([([0.0, 0.7, 0.0], [0.0, 0.0, 0.0])], support=4), fb.NoSupport, "support 4"),
     ],
 )
-def test_what_is_no_path_is_refused_in_one_line(path, error, said):
-    with pytest.raises(error, match=said) as refusal:
+def test_what_is_no_path_is_refused_in_one_line(path, error, words):
+    with pytest.raises(error, match=words) as refusal:
         fb.follow(arch(), path)
     assert "\n" not in str(refusal.value)
     assert isinstance(refusal.value, fb.FishboneError)
@@ -479,7 +479,7 @@ def test_settings_are_within_their_limits(monkeypatch, name, values):
             fb.follow(arch(), {ANGLE: -1.5}, **{name: value})
 
 
-def test_follow_says_what_it_needs():
+def test_follow_names_the_type_that_it_needs():
     with pytest.raises(fb.InvalidArgument, match="found str, allowed a Scenario or an Equilibrium"):
         fb.follow("planar.toml", {ANGLE: -1.5})
 
@@ -505,12 +505,12 @@ def test_what_is_not_there_is_refused(turned):
         branch.reaction(2)
 
 
-def test_progress_is_told_and_may_end_it():
-    told = []
-    fb.follow(strut(), {PUSH: -100.0}, progress=lambda branch, share: told.append((branch, share)))
-    assert {branch for branch, _ in told} <= set(range(10))
-    assert all(-0.1 <= share <= 1.1 for _, share in told)
-    assert told
+def test_progress_is_called_and_may_end_the_continuation():
+    calls = []
+    fb.follow(strut(), {PUSH: -100.0}, progress=lambda branch, share: calls.append((branch, share)))
+    assert {branch for branch, _ in calls} <= set(range(10))
+    assert all(-0.1 <= share <= 1.1 for _, share in calls)
+    assert calls
 
     for error in (ValueError("enough"), KeyboardInterrupt()):
 
@@ -526,7 +526,7 @@ class _Alarm(Exception):  # noqa: N818
     pass
 
 
-def test_a_signal_ends_it():
+def test_a_signal_ends_the_continuation():
     def ring(*_):
         raise _Alarm
 

@@ -1,4 +1,4 @@
-"""Results are those that were saved before, as far as another processor has them too; and what a comparison tells."""
+"""Results agree with the saved ones as far as processors agree; a comparison names the differences."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import golden
 
 POSES = 60
 SAME_ENERGY = 1e-6
-"""Of what rounding leaves alike on all processors: a solve ends where it is within 1e-8."""
+"""Relative difference between processors: a solve ends where its residuals are within 1e-8."""
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +52,7 @@ def test_what_differs_is_named_other_statuses_first(found):
     assert golden.wrong(golden.compare(found, changed), 1e-3) == lines[:2]
 
 
-def test_other_iterations_alone_are_told_and_are_not_wrong(found):
+def test_a_difference_in_iterations_alone_is_reported_and_is_no_error(found):
     changed = copy.deepcopy(found)
     name = next(iter(changed["poses"]))
     changed["poses"][name]["iterations"] = [1000]

@@ -244,14 +244,14 @@ def test_light_ribbon_stands_on_edge() -> None:
 
 
 def test_flat_ribbon_above_the_threshold_is_not_called_stable() -> None:
-    """What `solve` returns without a push has either left the plane or is not a minimum."""
+    """Without a disturbing force the result of `solve` has either left the plane or is not a minimum."""
     equilibrium = solve(on_edge(25.0, "sadowsky", 0.02, square_rib=False, push=0.0))
     assert abs(float(equilibrium.position[-1, 0])) > 0.1 or equilibrium.stable is not True
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_ribbon_falls_to_the_side_of_the_bulge(side: float) -> None:
-    """CONTRACT: `bulge` says which of mirror twins to take; x → −x is one, and nothing else tells them apart."""
+    """CONTRACT: `bulge` chooses between mirror images, here x → −x, which differ in nothing else."""
     scenario = on_edge(25.0, "sadowsky", 0.02, square_rib=False, push=0.0)
     scenario["solver"]["bulge"] = [side, 0.0, 0.0]
     equilibrium = solve(scenario)

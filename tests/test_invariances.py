@@ -1,4 +1,4 @@
-"""What must not change the answer, and what must change it in a known way."""
+"""Changes of a scenario that must not change its equilibrium, or must change it in a known way."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Iterations of the shipped scenarios, so that no change makes them more without anyone knowing."""
+"""Iterations of the shipped scenarios, so that no change raises them unnoticed."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ ITERATIONS = {
     "polystyrene": 14,
     "twist": 33,
 }
-"""Over all attempts, as they were when the solver was last changed on purpose."""
+"""Iterations over all attempts, as of the last intended change of the solver."""
 PLAY = 2
 
 
 @pytest.mark.parametrize("name", sorted(path.stem for path in SCENARIOS.glob("*.toml")))
 def test_scenario_takes_as_many_iterations_as_ever(name: str) -> None:
-    """Two more or less, for rounding on other machines."""
+    """The iterations, plus or minus two for rounding on other machines."""
     assert abs(fb.solve(fb.load(SCENARIOS / f"{name}.toml")).iterations - ITERATIONS[name]) <= PLAY

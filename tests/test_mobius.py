@@ -137,19 +137,19 @@ def test_fields_of_a_moebius_band_change_sign_at_the_seam(sign: int) -> None:
     assert abs(float(equilibrium.torsion[-1] - equilibrium.torsion[0])) < SEAM_ERROR
 
 
-def test_left_and_right_handed_moebius_bands_are_twins() -> None:
+def test_left_and_right_handed_moebius_bands_are_mirror_images() -> None:
     """Mirror images: the same energy and distances between points, opposite torsion."""
     right, left = solve(closed(1)), solve(closed(-1))
     assert left.energy == pytest.approx(right.energy, rel=1e-6)
     assert total_torsion(left) == pytest.approx(-total_torsion(right), rel=1e-2)
     assert abs(total_torsion(right)) > 1.0
-    # The seam may sit elsewhere along the band: what is compared does not depend on it.
+    # The seam may sit elsewhere along the band: the compared quantities do not depend on the place of the seam.
     assert float(np.mean(distances(left))) == pytest.approx(float(np.mean(distances(right))), rel=1e-4)
 
 
 @pytest.mark.parametrize("half_turns", [0, 1, -1])
-def test_result_says_with_how_many_half_turns_it_ended(half_turns: int) -> None:
-    """The twist asked for is where it starts; what it ended with stands in the result."""
+def test_result_has_the_half_turns_that_it_ended_with(half_turns: int) -> None:
+    """The scenario has the half turns of the start, the result those of the end."""
     elements = 100 if half_turns == 0 else ELEMENTS
     assert result(solve(closed(half_turns, elements=elements)))["half_turns"] == half_turns
 
@@ -182,7 +182,7 @@ def test_seam_may_lie_anywhere() -> None:
 
 @pytest.mark.parametrize("at", ["start", 0.3 * LENGTH])
 def test_support_of_a_closed_belt_holds_nothing(at: str | float) -> None:
-    """One pose given is no more than where the band is: no force, no moment, wherever along it."""
+    """A single pose only places the band: no force, no moment, wherever along the band."""
     pose = ((0.2, -0.1, 0.3), (0.3, 0.1, -0.2))
     equilibrium = solve(closed(1, [{**support("start", *pose, square_rib=False), "at": at}]))
     reaction = result(equilibrium)["supports"][0]

@@ -1,4 +1,4 @@
-"""What things are called: in Python as in the core, and so in files."""
+"""Words are the same in Python, in the core and in files."""
 
 import json
 from typing import Literal, get_args, get_origin, get_type_hints
@@ -14,7 +14,7 @@ NAMES = _core.names()
 WORDS = [list_ for list_ in NAMES if hasattr(names, list_)]
 REASONS = [list_ for list_ in NAMES if hasattr(fb, list_)]
 NEVER_SEEN = {"interrupted"}
-"""Whoever has interrupted what ended so is not given it."""
+"""Words of the core that no result has: an interrupted solve returns no result."""
 
 
 def schema() -> helpers.Json:
@@ -51,9 +51,9 @@ def test_the_ends_of_a_belt_are_those_of_the_schema():
     assert literals(names.Place) == set(schema()["Place"]["anyOf"][0]["enum"])
 
 
-def test_every_word_that_is_drawn_or_told_is_one():
+def test_every_word_that_is_drawn_or_printed_is_a_word_of_the_core():
     assert set(chart.MARKERS) == set(NAMES["Kind"])
-    # Where a branch meets another, or comes to the end of the path, the table says so in other words.
+    # The table has other words for a branch that meets another or reaches the end of the path.
     assert set(report.ENDS) == set(NAMES["End"]) - NEVER_SEEN - {"range", "event"}
 
 

@@ -95,14 +95,14 @@ def test_free_belt_rolls_to_its_natural_radius(energy: Energy, width: float, cur
 @energy_model
 @pytest.mark.parametrize("poisson", [-0.5, 0.0, 0.3, 0.49])
 def test_free_roll_does_not_depend_on_poissons_ratio(energy: Energy, poisson: float) -> None:
-    """ν has a say only where β ≠ 0."""
+    """ν matters only where β ≠ 0."""
     equilibrium = solve(held_at_the_start(energy, poisson=poisson))
     assert equilibrium.elastic_energy == pytest.approx(0.0, abs=1e-10)
     assert equilibrium.position[-1] == pytest.approx(roll(np.array([1.0]), CURL)[0], abs=1e-6)
 
 
 @energy_model
-def test_free_roll_pulls_at_nothing(energy: Energy) -> None:
+def test_free_roll_has_no_reactions(energy: Energy) -> None:
     """The unloaded shape: no reaction, no internal moment."""
     equilibrium = solve(held_at_the_start(energy))
     force, moment = internal(equilibrium)
@@ -156,7 +156,7 @@ def test_arc_with_natural_bend_stays_a_strip_of_its_own_curvature() -> None:
 def test_curled_belt_clamped_flat_stores_half_its_curvature_squared(energy: Energy, curl: float) -> None:
     """ω_ζ = 0: R_f k² U/2, no force along, and a moment −R_f k about ζ all along.
 
-    A straight belt does not give way in its plane nor, with square ribs, to twist: the force along z and the moments
+    A straight belt has no compliance in its plane and, with square ribs, to twist: the force along z and the moments
     about x and y are not determined, and hardly leaning ribs let them into the others. (A belt of more curl, k U = 0.6,
     can do with less by twisting out of the plane.)
     """
@@ -216,7 +216,7 @@ def twisted(energy: Energy, poisson: float) -> Json:
 
 @energy_model
 def test_energy_changes_with_poissons_ratio_by_the_twist(energy: Energy) -> None:
-    """dE/dν = −R_f k ∫ β² ω_ζ du, times sqrt(1+β²) in `fishbone`: what changes of the shape is of second order."""
+    """dE/dν = −R_f k ∫ β² ω_ζ du, times sqrt(1+β²) in `fishbone`: the change of the shape is of second order."""
     step = 1e-3
     less, more = (solve(twisted(energy, 0.3 + sign * step)).energy for sign in (-1.0, 1.0))
     equilibrium = solve(twisted(energy, 0.3))

@@ -110,7 +110,7 @@ def test_a_support_that_is_not_there_is_an_error(equilibrium, support):
         equilibrium.reaction(support)
 
 
-def test_the_result_as_a_dict_says_what_the_attributes_say(equilibrium):
+def test_the_result_as_a_dict_has_the_numbers_of_the_attributes(equilibrium):
     result = equilibrium.to_dict()
     assert result["schema"] == "fishbone.result/1"
     assert result["status"] == equilibrium.status == "converged"
@@ -197,7 +197,7 @@ def test_an_invalid_scenario_is_refused_in_one_line(tables):
 
 
 @pytest.mark.parametrize(
-    ("name", "content", "said"),
+    ("name", "content", "words"),
     [
         ("empty.toml", b"", "nothing"),
         ("blank.json", b" \n", "nothing"),
@@ -212,10 +212,10 @@ def test_an_invalid_scenario_is_refused_in_one_line(tables):
         ("deep.json", b"[" * 100_000, "line 1"),
     ],
 )
-def test_a_file_that_is_no_scenario_is_refused_in_one_line_with_its_name(tmp_path, name, content, said):
+def test_a_file_that_is_no_scenario_is_refused_in_one_line_with_its_name(tmp_path, name, content, words):
     path = tmp_path / name
     path.write_bytes(content)
-    with pytest.raises(fb.InvalidScenario, match=said) as refusal:
+    with pytest.raises(fb.InvalidScenario, match=words) as refusal:
         fb.load(path)
     assert str(refusal.value).startswith(f"{path}: ")
     assert "\n" not in str(refusal.value)
@@ -303,7 +303,7 @@ def test_plot_and_export_are_there_without_an_import_of_their_own():
         _ = fb.nothing
 
 
-def test_solve_says_what_it_needs():
+def test_solve_names_the_type_that_it_needs():
     with pytest.raises(fb.InvalidArgument, match=r"found str, allowed a Scenario, as fishbone\.load gives"):
         fb.solve("example1.toml")  # type: ignore[arg-type]
 

@@ -1,4 +1,4 @@
-"""The planar reference against what it is not made from: closed forms, SciPy's boundary value solver, differences."""
+"""The planar reference against independent ones: closed forms, SciPy's boundary value solver, differences."""
 
 from __future__ import annotations
 
@@ -148,7 +148,7 @@ def test_fold_is_where_it_was_found(expected: Expected) -> None:
 
 @each_fold
 def test_fold_is_where_the_jacobian_of_the_shots_is_singular(expected: Expected) -> None:
-    """From values rounded to two digits: nothing of the other discretisation goes in."""
+    """From values rounded to two digits, so that the two discretisations are independent."""
     state = expected.fold.state
     near = np.asarray(np.round(np.append(state.bend(0.0), state.force), 2), dtype=np.float64)
     base = expected.start.pose * (np.array(expected.direction) == 0.0)

@@ -39,7 +39,7 @@ def test_the_graphs_show_the_rib_angle_in_degrees_and_the_bend(equilibrium):
     np.testing.assert_array_equal(graphs["Bend"], equilibrium.bend)
 
 
-# In an SVG file matplotlib names some objects by where they lie in memory.
+# Matplotlib names some objects in an SVG file by their addresses in memory.
 @pytest.mark.parametrize("suffix", [".png", ".pdf"])
 def test_the_same_shape_gives_the_same_file(equilibrium, example, suffix):
     digests = {hashlib.sha256(plot.encode(one, suffix)).digest() for one in (equilibrium, fb.solve(example))}
@@ -90,7 +90,7 @@ def test_another_suffix_is_refused(equilibrium, tmp_path, module):
 @pytest.mark.parametrize(
     ("module", "package", "extra"), [("plot", "matplotlib", "plot"), ("export", "trimesh", "mesh")]
 )
-def test_a_missing_package_says_how_to_get_it(monkeypatch, module, package, extra):
+def test_the_error_of_a_missing_package_has_the_command_that_installs_it(monkeypatch, module, package, extra):
     monkeypatch.delitem(sys.modules, f"fishbone.{module}")
     monkeypatch.delattr(fb, module)
     monkeypatch.setitem(sys.modules, package, None)
@@ -100,7 +100,7 @@ def test_a_missing_package_says_how_to_get_it(monkeypatch, module, package, extr
 
 
 def everything(example):
-    """A board with something of all that a picture marks."""
+    """A board with every kind of mark in a picture."""
     return fb.Scenario.from_dict(
         {
             "belt": {
@@ -215,10 +215,10 @@ def lines_of(axes, style):
 
 
 ALWAYS = ["tightest bend\n[1/length]", "rib margin\n[1/length]"]
-"""What is shown last of any belt."""
+"""Labels of the last panels of every belt."""
 
 
-def test_a_diagram_shows_what_a_report_on_a_path_tells(turned):
+def test_a_diagram_shows_the_quantities_of_the_branches(turned):
     figure = plot.diagram(turned)
     [branch] = turned.branches
     force = np.linalg.norm(branch.reaction("end").force, axis=1)
@@ -306,7 +306,7 @@ def test_a_diagram_is_saved_like_an_equilibrium(turned, tmp_path):
 # ---------------------------------------------------------------------------------------------- several equilibria
 
 
-def test_an_overview_says_energy_and_stability_of_each(arches):
+def test_an_overview_shows_energy_and_stability_of_each(arches):
     figure = plot.overview(arches)
     titles = [axes.get_title() for axes in figure.axes if axes.get_title()]
     for index, (title, one) in enumerate(zip(titles, arches[: plot.SHOWN], strict=True)):
@@ -327,7 +327,7 @@ def test_an_overview_has_one_scale(arches):
         assert (high <= (axes.get_xlim()[1], axes.get_ylim()[1])).all()
 
 
-def test_an_overview_says_how_many_more_there_are(arches):
+def test_an_overview_has_the_number_of_equilibria_not_shown(arches):
     many = (arches * plot.SHOWN)[: plot.SHOWN + 3]
     figure = plot.overview(many)
     assert "3 more" in figure.get_suptitle()

@@ -1,5 +1,5 @@
-"""Random end poses: whatever the solver says has converged must be an equilibrium of the model, checked from its
-fields alone."""
+"""Random end poses: every converged result is an equilibrium of the model, checked from its fields
+alone."""
 
 from __future__ import annotations
 
@@ -155,7 +155,7 @@ def test_converged_result_is_an_equilibrium_of_the_model_wherever_the_end_is(
 def test_poses_tend_to_the_integral_of_the_fields_with_the_fourth_order(
     energy: Energy, build: Callable[..., Json]
 ) -> None:
-    """The same comparison under refinement: what is left is the Magnus step's own error, O(h⁴)."""
+    """The same comparison under refinement: the error left is that of the Magnus step, O(h⁴)."""
     errors = []
     for elements in (40, 80, 160):
         equilibrium = solve(build(energy, elements=elements))

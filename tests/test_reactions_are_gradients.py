@@ -26,13 +26,13 @@ NAMES = sorted(path.stem for path in SCENARIOS.glob("*.toml"))
 TOLERANCE = 1e-12
 STEP = 1e-5
 ERROR = 1e-6
-"""Of the norm of the whole reaction."""
+"""Relative to the norm of the whole reaction."""
 FREE_ERROR = 1e-10
 WEIGHTS = {-2: 1.0 / 12.0, -1: -8.0 / 12.0, 1: 8.0 / 12.0, 2: -1.0 / 12.0}
 
-TWINS = {"twist"}
-"""Half a turn about (1, 0, −1) maps these supports to each other, the belt to another one of the same energy. Which of
-the two the search finds may change with the last digit of a pose; of the lesser of both the energy has a kink."""
+MIRROR_IMAGES = {"twist"}
+"""Half a turn about (1, 0, −1) exchanges these supports and maps the belt to another belt of the same energy. Rounding
+decides which of the two the search finds. As a function of the pose the lower of their energies has a corner."""
 
 
 # --------------------------------------------------------------------------------------------------- scenarios
@@ -126,7 +126,7 @@ def check(scenario: Json, index: int, energy: Callable[[Json], float]) -> None:
 OPEN = [name for name in NAMES if not shipped(name)["belt"].get("closed")]
 
 
-@pytest.mark.parametrize("name", [name for name in OPEN if name not in TWINS])
+@pytest.mark.parametrize("name", [name for name in OPEN if name not in MIRROR_IMAGES])
 def test_reactions_are_the_gradient_of_the_least_energy(name: str) -> None:
     scenario = shipped(name)
     for index in range(len(scenario["supports"])):
@@ -159,14 +159,14 @@ RELEASES: dict[str, Callable[[Json], None]] = {"pinned": pinned, "sliding": slid
 CLAMPED = [name for name in NAMES if len(shipped(name)["supports"]) == 2]
 ASKEW = (0.03, -0.04, 0.05, 0.1, -0.15, 0.2)
 UNSETTLED = {("hinge", "pinned"), ("hinge", "sliding")}
-"""Shapes a thousandth and a fifteenth apart in energy: which of them the search finds changes with the pose."""
+"""Scenarios with shapes a thousandth and a fifteenth apart in energy: the pose decides which one the search finds."""
 
 each_release = pytest.mark.parametrize("release", RELEASES)
 each_clamped = pytest.mark.parametrize("name", CLAMPED)
 
 
 def released(name: str, release: str) -> Json:
-    """A shipped scenario whose end is let go in part; moved before, or mirror twins would have the same energy."""
+    """A shipped scenario whose end is partly free; moved first, as its mirror images would have the same energy."""
     scenario = shipped(name)
     for component, step in enumerate(ASKEW):
         scenario = moved(scenario, 1, component, step)
@@ -206,7 +206,7 @@ CLOSED = [name for name in NAMES if name not in OPEN]
 
 @pytest.mark.parametrize("name", CLOSED)
 def test_closed_belt_held_at_one_place_takes_no_reaction(name: str) -> None:
-    """It moves as a whole: nor has its energy a gradient."""
+    """The belt moves as a whole: reactions and gradient are 0."""
     scenario = shipped(name)
     equilibrium = solve(scenario)
     assert np.linalg.norm(reaction(equilibrium, 0)) < FREE_ERROR * equilibrium.energy

@@ -73,22 +73,22 @@ def test_example_1_is_symmetric_about_its_middle(energy: Energy) -> None:
 
 
 @rows
-def test_bulging_the_other_way_gives_the_mirrored_twin(
+def test_bulging_the_other_way_gives_the_mirror_image(
     name: str, energy: Energy, value: float, peak: tuple[float, float, float]
 ) -> None:
-    """MODEL §4: "each has its mirror image (x → −x) at the same energy"; CONTRACT: `bulge` chooses the twin."""
-    equilibrium, twin = solved(name, energy), solved(name, energy, bulge=-1.0)
-    assert twin.energy == pytest.approx(equilibrium.energy, rel=1e-7)
+    """MODEL §4: "each has its mirror image (x → −x) at the same energy"; CONTRACT: `bulge` chooses the image."""
+    equilibrium, image = solved(name, energy), solved(name, energy, bulge=-1.0)
+    assert image.energy == pytest.approx(equilibrium.energy, rel=1e-7)
     mirrored = equilibrium.position * np.array([-1.0, 1.0, 1.0])
-    assert np.max(np.abs(twin.position - mirrored)) < 1e-5
-    assert math.isclose(highest_point(twin, (-1.0, 0.0, 0.0))[0], -highest_point(equilibrium)[0], abs_tol=1e-5)
+    assert np.max(np.abs(image.position - mirrored)) < 1e-5
+    assert math.isclose(highest_point(image, (-1.0, 0.0, 0.0))[0], -highest_point(equilibrium)[0], abs_tol=1e-5)
 
 
 @rows
 def test_default_discretisation_is_80_elements(
     name: str, energy: Energy, value: float, peak: tuple[float, float, float]
 ) -> None:
-    """CONTRACT: 8 U/V, at least 80; both are 80 here, and bulge is +x unless told: nothing changes."""
+    """CONTRACT: 8 U/V, at least 80; both are 80 here, and bulge is +x by default: nothing changes."""
     build = {"example1": example1, "example2": example2}[name]
     equilibrium = solve(build(energy))
     assert equilibrium.u.shape == (81,)

@@ -212,7 +212,7 @@ def test_least_energy_shape_is_not_called_unstable(energy: Energy, name: str) ->
 @energy_model
 @pytest.mark.parametrize("name", ["example1", "example2"])
 def test_least_bend_radius_is_no_larger_than_that_of_the_spine(energy: Energy, name: str) -> None:
-    """(1 − v s)/|κ₁| over the whole width: at v = 0 it is 1/|κ₁|. 2 % for where along u it is sampled."""
+    """(1 − v s)/|κ₁| over the whole width: at v = 0 it is 1/|κ₁|. 2 % for the sampling along u."""
     output = result(solve(SCENARIOS[name](energy)))
     least = output["least_bend_radius"]
     on_spine = 1.0 / float(np.max(np.abs(output["curvature"])))

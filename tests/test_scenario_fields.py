@@ -1,4 +1,4 @@
-"""Every field of a scenario: one that is good and solves, one that is bad and is refused by name.
+"""Every field of a scenario: valid values are solved, invalid values are refused by the name of the field.
 
 CONTRACT, "Scenario file". A field that is read and has no effect is as wrong as one that is not read: the last
 tests say what some of them must do.
@@ -321,7 +321,7 @@ def test_layers_of_one_material_are_one_sheet(shares: tuple[float, ...]) -> None
 
 
 def test_poissons_ratio_of_the_material_wins() -> None:
-    """`belt.poisson` has no say beside a material that has its own."""
+    """`belt.poisson` has no effect beside a material that has its own."""
     supports = [START, support("end", (-0.08, 0.14, 0.02), (0.4, 0.3, 1.2))]
     energies = []
     for poisson in (0.0, 0.45):

@@ -1,4 +1,4 @@
-"""The shipped scenarios: what each comes to on ever finer meshes, and surfaces that are the flat board bent.
+"""The shipped scenarios: their limits under refinement, and surfaces isometric to the flat board.
 
 The values of the source's two examples come from an independent solver (MODEL §4), that of the Möbius band from
 Starostin & van der Heijden (2007), all others from meshes of 640 elements and more.

@@ -340,7 +340,7 @@ def test_rigidity_is_that_of_the_place_however_it_is_written(energy: Energy) -> 
 
 
 def test_segment_rigidity_wins_over_that_of_the_belt() -> None:
-    """Where every segment has its own, the belt's has no say; twice the rigidity, twice the energy."""
+    """The belt's rigidity has no effect where every segment has its own; twice the rigidity, twice the energy."""
     one = solve(held([straight(1.0)], elements=80))
     two = solve(held([straight(1.0, rigidity=2.0)], rigidity=5.0, elements=80))
     assert two.energy == pytest.approx(2.0 * one.energy, rel=1e-8)

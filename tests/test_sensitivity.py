@@ -33,10 +33,10 @@ from helpers import (
 )
 
 TOLERANCE = 1e-12
-"""Of the solves, as tight as the solver takes it: differences over STEP lose five digits."""
+"""Tolerance of the solves, the smallest that the solver takes: differences over STEP lose five digits."""
 STEP = 1e-5
 ERROR = 1e-6
-"""Relative, in the norm; what is found is 1e-8 to 1e-11."""
+"""Relative error in the norm; the errors found are 1e-8 to 1e-11."""
 TRANSPOSE_ERROR = 1e-10
 
 energy_model = pytest.mark.parametrize("energy", ENERGIES)
@@ -90,7 +90,7 @@ CASES: dict[str, Json] = {
     ),
     "closed": board([straight(1.0)], [], elements=80, closed=True, half_turns=1),
 }
-"""One of everything."""
+"""A scenario with every kind of parameter."""
 
 scenarios = pytest.mark.parametrize("name", CASES)
 
@@ -139,7 +139,7 @@ def changed(scenario: Json, direction: Json, step: float) -> Json:
 
 
 def state(equilibrium: fb.Equilibrium, frames: Array, supports: int) -> dict[str, Array]:
-    """All that a `Change` is of, rotations from given frames."""
+    """The quantities of a `Change`, rotations from given frames."""
     turns = zip(equilibrium.frame, frames, strict=True)
     wrenches = [np.concatenate(equilibrium.reaction(i)) for i in range(supports)]
     return {
@@ -171,7 +171,7 @@ def differences(scenario: Json, direction: Json, step: float) -> dict[str, Array
 
 
 def errors(change: fb.Change, expected: dict[str, Array], floor: float = 1e-3) -> dict[str, float]:
-    """Relative errors in the norm; of what hardly changes, by the floor."""
+    """Errors in the norm, relative to the change or to a floor."""
     return {
         name: float(np.linalg.norm(getattr(change, name) - value) / max(float(np.linalg.norm(value)), floor))
         for name, value in expected.items()
@@ -230,7 +230,7 @@ def test_change_by_the_width_is_that_of_equilibria_solved_afresh(energy: Energy,
 
 
 def test_change_of_a_mobius_band_by_its_width_is_that_of_bands_solved_afresh() -> None:
-    """Not with the other energies: ribs of theirs that all but touch begin to, within any step."""
+    """`wunderlich` only: with the other energies ribs that nearly touch begin to touch within any step."""
     check(of("closed", "wunderlich"), {"width": 1.0})
 
 
@@ -458,7 +458,7 @@ def test_supports_of_a_mobius_band_move_it() -> None:
 
 
 def test_change_predicts_the_equilibrium_to_second_order() -> None:
-    """The end of example 1, moved by 1e-3 U: what is missed is of the order of its square."""
+    """The end of example 1, moved by 1e-3 U: the error is of the order of the square."""
     scenario = of("example 1", "wunderlich")
     motions = np.array([[0.0] * 6, [0.3, 0.5, -0.2, 0.1, 0.2, 0.4]])
     predicted = solve(scenario).position + 1e-3 * solve(scenario).sensitivity().forward(supports=motions).position
@@ -526,7 +526,7 @@ def test_belt_between_two_pins_swings_and_has_no_derivatives(energy: Energy) -> 
 
 
 @energy_model
-def test_taut_belt_has_no_derivatives(energy: Energy) -> None:
+def test_belt_without_slack_has_no_derivatives(energy: Energy) -> None:
     assert "no slack" in refusal(clamped((0.0, 1.0, 0.0), energy=energy, elements=80))
 
 

@@ -54,7 +54,7 @@ def test_other_energies_are_farther_from_the_thinnest_shell(other: Energy) -> No
 
 @pytest.mark.parametrize("energy", ENERGIES)
 def test_shell_and_belt_are_on_the_same_side(energy: Energy) -> None:
-    """Not the mirrored twin: the shell's peak is at x > 0, and the default bulge is +x."""
+    """Not the mirror image: the shell's peak is at x > 0, and the default bulge is +x."""
     for name in BOUNDS:
         height = float(np.max(np.array(shell(name)["position"])[:, 0]))
         equilibrium = solve(shell_scenario(name, energy))

@@ -1,6 +1,6 @@
-"""What is wrong in the source, each point shown by a number.
+"""The errors of the source, each shown by a number.
 
-Source: Wakamatsu, Arai, Hirai, "Fishbone Model for Belt Object Deformation"; docs/theory.md tells the same in words.
+Source: Wakamatsu, Arai, Hirai, "Fishbone Model for Belt Object Deformation"; docs/theory.md has them in words.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ def test_source_method_locks_as_the_penalty_rises() -> None:
 @pytest.mark.parametrize("updates", [1, 10])
 @pytest.mark.parametrize("example", ritz.PRINTED)
 def test_multiplier_updates_do_not_meet_the_equations(example: str, updates: int) -> None:
-    """There is nothing for the multipliers to converge to."""
+    """There are no multipliers of an exact solution to converge to."""
     missed = ritz.misses(ritz.solve(example, penalty=1e2, updates=updates))
     assert missed.geodesic > 1e-2
     assert missed.rib_slope > 1e-2
@@ -117,7 +117,7 @@ def test_reported_violation_is_that_of_the_reported_shape() -> None:
 
 
 def test_printed_values_lie_on_the_way_to_locking() -> None:
-    """0.35 U and (0.3, 0.4, −0.01) U come out at a penalty of 1e2, far from what the source's problem has."""
+    """A penalty of 1e2 yields 0.35 U and (0.3, 0.4, −0.01) U, far from the exact solution of the source's problem."""
     first, second = (ritz.solve(example, penalty=1e2, updates=1) for example in ritz.PRINTED)
     assert highest_point(first)[0] == pytest.approx(0.35, abs=0.005)
     assert highest_point(second) == pytest.approx([0.3, 0.4, -0.01], abs=0.05)
@@ -127,7 +127,7 @@ def test_printed_values_lie_on_the_way_to_locking() -> None:
 
 
 def test_that_no_exact_solution_exists_is_specific_to_ten_functions() -> None:
-    """With 12 functions the collocated equations can be met, and the belt escapes between the points instead."""
+    """With 12 functions the collocated equations can be met, and the violation moves between the points."""
     ten, twelve = (ritz.misses(ritz.solve("example1", penalty=1e4, updates=0, basis=n)) for n in (10, 12))
     assert twelve.geodesic < 0.02 * ten.geodesic
     assert twelve.geodesic_along > 1.0
@@ -135,7 +135,7 @@ def test_that_no_exact_solution_exists_is_specific_to_ten_functions() -> None:
 
 
 def test_zero_angles_at_the_end_ask_for_more_than_the_frame() -> None:
-    """Eq. (46): φ = −ψ, θ = 0 is the natural frame for any φ. Asked for the frame alone, the method ends lower."""
+    """Eq. (46): φ = −ψ, θ = 0 is the natural frame for any φ. With the frame alone the method ends lower."""
     assert euler_frame(0.7, 0.0, -0.7) == pytest.approx(np.eye(3))
     # The package hands the method any frame but the natural one as a frame; 1e-9 rad make no other difference.
     angles, frame = (ritz.solve("example1", tilt=tilt, penalty=1e1, updates=0) for tilt in (0.0, 1e-9))

@@ -1,4 +1,4 @@
-"""The speed benchmark, as far as it needs none of its rivals: its poses, what it counts, the page written from it."""
+"""The speed benchmark, as far as it needs none of its rivals: its poses, its counts, the page written from them."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def turn(a, b):
 
 
 @examples
-def test_path_is_closed_and_leaves_the_end_pose_by_as_much_as_it_says(example):
+def test_path_is_closed_and_its_distance_from_the_end_pose_is_the_documented_one(example):
     base, poses = end_pose(example), list(path(example, 501))
     for end in (poses[0], poses[-1]):
         assert np.allclose(end.position, base.position, atol=1e-12)

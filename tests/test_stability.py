@@ -1,6 +1,6 @@
-"""Stability counted, modes, and how far it is to the loss of stability.
+"""Counts of stability, modes, and the margin to the loss of stability.
 
-Expected values are closed forms of the vibrating and the buckled beam, or come from `planar`, which knows nothing of
+Expected values are closed forms of the vibrating and the buckled beam, or come from `planar`, which is independent of
 the package. The scale of modes is the mean squared displacement of the board, all of it weighing alike: with one unit
 of mass in all, eigenvalues are squared natural frequencies.
 """
@@ -62,9 +62,9 @@ def test_mode_scales_with_the_belt(length: float) -> None:
 
 
 def second_difference(scenario: fb.Scenario, equilibrium: fb.Equilibrium, mode: fb.Mode) -> float:
-    """Second derivative of the energy along a mode: how much a dead force that holds it there has to pull.
+    """Second derivative of the energy along a mode, from the dead force that holds the belt there.
 
-    The belt is pulled by dead forces along the mode's own displacement, the same per length all along: to first order
+    The belt is loaded by dead forces along the mode's own displacement, the same per length all along: to first order
     it moves by the force over the eigenvalue along the mode, and along no other.
     """
     nodes = np.arange(2, len(equilibrium.u) - 2)
@@ -133,7 +133,7 @@ def test_flat_strut_has_as_many_negative_modes_as_loads_are_passed(force: float,
 
 @pytest.mark.parametrize("force", [-30.0, 30.0])
 def test_flat_strut_under_less_is_left_open(force: float) -> None:
-    """Where it is flat, ribs of any slope are as good as others: that none of them lets it buckle is not counted."""
+    """Where the belt is flat, slopes of ribs cost no energy; the count does not show buckling along slanted ribs."""
     scenario = strut(force)
     scenario["solver"] = {"tolerance": 1e-2}
     equilibrium = flat(scenario)
@@ -202,12 +202,12 @@ def test_margin_is_refused_where_there_is_none() -> None:
 
 @pytest.mark.parametrize("reach", [1.5, 3.5, 5.0])
 def test_margin_does_not_depend_on_how_far_it_looks(reach):
-    """Beyond half a turn the way is not the shorter one."""
+    """Beyond half a turn the way is not the shorter turn."""
     margin = solve(clamped((0.0, 0.6, 0.0))).snap_margin(direction=(0.0, 0.0, 0.0, 0.0, 0.0, -1.0), reach=reach)
     assert margin.distance == pytest.approx(1.1230897421, abs=1e-4)
 
 
-def test_belt_that_is_drawn_taut_has_lost_nothing():
+def test_belt_that_is_drawn_straight_has_no_margin():
     assert solve(clamped((0.0, 0.6, 0.0))).snap_margin(direction=(0.0, 1.0, 0.0, 0.0, 0.0, 0.0), reach=0.6) is None
 
 

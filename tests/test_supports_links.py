@@ -306,43 +306,43 @@ def test_link_makes_a_loop_of_a_belt_that_nothing_else_holds() -> None:
 
 
 def outcome(scenario: Json) -> tuple[str, str]:
-    """The status and every word that came with it; a scenario refused at once is "invalid"."""
+    """The status and all text of the result; "invalid" where the scenario is refused."""
     try:
         equilibrium = solve_any(scenario)
     except fb.InvalidScenario as error:
         return "invalid", str(error)
-    said = {key: value for key, value in result(equilibrium).items() if key != "scenario"}
-    return equilibrium.status, f"{said} {getattr(equilibrium, 'message', '')}"
+    fields = {key: value for key, value in result(equilibrium).items() if key != "scenario"}
+    return equilibrium.status, f"{fields} {getattr(equilibrium, 'message', '')}"
 
 
-def assert_supports_named(said: str, places: tuple[float, float]) -> None:
-    """By index, or by where they are."""
-    by_index = "supports[1]" in said or "supports[2]" in said
-    assert by_index or all(f"u = {at}" in said for at in places), said
+def assert_supports_named(message: str, places: tuple[float, float]) -> None:
+    """The message names a support by its index, or both by their places."""
+    by_index = "supports[1]" in message or "supports[2]" in message
+    assert by_index or all(f"u = {at}" in message for at in places), message
 
 
 def test_link_longer_than_the_belt_between_its_ends_is_named() -> None:
     """0.5 across 0.4 of belt: never "converged"."""
-    status, said = outcome(linked((0.0, 0.5, 0.0)))
+    status, message = outcome(linked((0.0, 0.5, 0.0)))
     assert status in {"infeasible", "not_converged", "invalid"}
-    assert "links[0]" in said
+    assert "links[0]" in message
 
 
 def test_only_the_impossible_link_is_named() -> None:
     good = {"from": 0.1, "to": 0.2, "offset": [0.02, 0.08, 0.0]}
     scenario = held([], links=[good, {"from": 0.3, "to": 0.7, "offset": [0.3, 0.3, 0.0]}])
-    status, said = outcome(scenario)
+    status, message = outcome(scenario)
     assert status in {"infeasible", "not_converged", "invalid"}
-    assert "links[1]" in said
-    assert "links[0]" not in said
+    assert "links[1]" in message
+    assert "links[0]" not in message
 
 
 def test_supports_too_far_apart_inside_the_span_are_named() -> None:
     """0.4 of belt cannot reach over 0.5."""
     inner: list[Json] = [{"at": 0.3, "position": [0.0, 0.1, 0.0]}, {"at": 0.7, "position": [0.0, 0.6, 0.0]}]
-    status, said = outcome(held(inner))
+    status, message = outcome(held(inner))
     assert status in {"infeasible", "not_converged", "invalid"}
-    assert_supports_named(said, (0.3, 0.7))
+    assert_supports_named(message, (0.3, 0.7))
 
 
 @pytest.mark.parametrize("distance", [0.15, 0.25])
@@ -352,20 +352,20 @@ def test_supports_in_one_stiffener_at_a_wrong_distance_are_named(distance: float
         {"at": 0.4, "position": [0.1, 0.3, 0.0]},
         {"at": 0.6, "position": [0.1, 0.3 + distance, 0.0]},
     ]
-    status, said = outcome(held(inner, segments=[straight(0.4), rigid(0.2), straight(0.4)]))
+    status, message = outcome(held(inner, segments=[straight(0.4), rigid(0.2), straight(0.4)]))
     assert status in {"infeasible", "not_converged", "invalid"}
-    assert_supports_named(said, (0.4, 0.6))
+    assert_supports_named(message, (0.4, 0.6))
 
 
 def test_supports_in_one_stiffener_at_its_distance_hold() -> None:
-    """What a stiffener implies anyway is not a contradiction: solved, or refused as saying it twice."""
+    """Supports that repeat the constraint of a stiffener are redundant, not contradictory: solved, or refused."""
     inner: list[Json] = [{"at": 0.4, "position": [0.1, 0.3, 0.0]}, {"at": 0.6, "position": [0.1, 0.5, 0.0]}]
     scenario = held(inner, segments=[straight(0.4), rigid(0.2), straight(0.4)])
     scenario["supports"][-1]["position"] = [0.0, 0.8, 0.05]
-    status, said = outcome(scenario)
-    assert status in {"converged", "invalid"}, said
+    status, message = outcome(scenario)
+    assert status in {"converged", "invalid"}, message
     if status == "invalid":
-        assert_supports_named(said, (0.4, 0.6))
+        assert_supports_named(message, (0.4, 0.6))
 
 
 def redundant(offset: Any) -> Json:
@@ -374,9 +374,9 @@ def redundant(offset: Any) -> Json:
 
 def test_link_that_the_supports_imply_is_named() -> None:
     """Solved, with a warning that names the link."""
-    status, said = outcome(redundant(END_POSITION))
+    status, message = outcome(redundant(END_POSITION))
     assert status == "converged"
-    assert "links[0]" in said
+    assert "links[0]" in message
 
 
 def test_link_that_the_supports_imply_does_not_change_the_shape() -> None:
@@ -387,9 +387,9 @@ def test_link_that_the_supports_imply_does_not_change_the_shape() -> None:
 
 def test_link_that_the_supports_contradict_is_named() -> None:
     """Both ends held, the link asks for another offset between them."""
-    status, said = outcome(redundant(np.add(END_POSITION, (0.1, 0.0, 0.0))))
+    status, message = outcome(redundant(np.add(END_POSITION, (0.1, 0.0, 0.0))))
     assert status in {"infeasible", "not_converged", "invalid"}
-    assert "links[0]" in said
+    assert "links[0]" in message
 
 
 def test_reaction_of_a_support_is_found_by_its_place() -> None:

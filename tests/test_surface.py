@@ -70,7 +70,7 @@ def distances_between_neighbouring_ribs(points: Array) -> Array:
 @energy_model
 @cases
 def test_surface_has_the_documented_shape(energy: Energy, build: Build) -> None:
-    """CONTRACT: (n, n_across, 3), 9 across unless told."""
+    """CONTRACT: (n, n_across, 3), 9 across by default."""
     equilibrium = solve(build(energy))
     nodes = len(equilibrium.u)
     assert equilibrium.surface().shape == (nodes, 9, 3)
@@ -267,7 +267,7 @@ def test_surface_is_developable_and_isometric_to_discretisation_error(
 @measure_name
 @energy_model
 def test_wound_surface_is_developable_and_isometric_with_the_second_order(energy: Energy, measure: str) -> None:
-    """The same measures on a cylinder, where the fields are constant; where a defect vanishes it is rounding."""
+    """The same measures on a cylinder, where the fields are constant; a vanishing defect is at rounding."""
     position, frame = constant_twist_pose(-1.5, 0.4, 1.0)
     function, bound, _ = MEASURES[measure]
     defects = np.array(

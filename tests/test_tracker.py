@@ -1,4 +1,4 @@
-"""Following an equilibrium while a support moves: the same shapes as solved afresh, and snaps are told."""
+"""Tracking of a minimum while a support moves: its shapes are those solved afresh, and snaps are reported."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_tracker_has_the_energy_of_the_equilibrium_solved_afresh(energy: Energy)
 
 @pytest.mark.parametrize("energy", ENERGIES)
 def test_tracker_keeps_to_the_branch_of_ten_times_finer_steps(energy: Energy) -> None:
-    """Not one wrong branch, whatever the step."""
+    """No update is on a wrong branch, whatever the step."""
     coarse, fine = fb.Tracker(example(energy)), fb.Tracker(example(energy))
     poses = way(2000)
     for k, (position, rotation) in enumerate(poses):
@@ -67,7 +67,7 @@ def test_update_takes_two_newton_steps_on_a_smooth_path() -> None:
 
 
 def test_shape_and_reactions_are_those_of_the_equilibrium() -> None:
-    """At no extra solve."""
+    """Reactions need no extra solve."""
     tracker = fb.Tracker(example())
     for pose in way(100)[:20]:
         tracker.update(*pose)
@@ -84,7 +84,7 @@ def test_shape_and_reactions_are_those_of_the_equilibrium() -> None:
 
 
 def test_pose_of_the_support_is_met() -> None:
-    """By the last node, to rounding."""
+    """The last node is at the pose of the clamp, to rounding."""
     tracker = fb.Tracker(example())
     position, rotation = way(40)[7]
     tracker.update(position, rotation)
@@ -104,8 +104,8 @@ def planar(elements: int = 80) -> fb.Scenario:
     )
 
 
-def test_snap_is_told_and_leads_to_less_energy() -> None:
-    """An arch whose end is turned against it lets go of its energy once, and then only."""
+def test_snap_is_reported_and_leads_to_less_energy() -> None:
+    """The energy of an arch whose end is turned back falls at one snap only."""
     tracker = fb.Tracker(planar())
     energies, snaps = [tracker.energy], [False]
     for angle in np.linspace(0.0, -2.2, 221):
@@ -119,7 +119,7 @@ def test_snap_is_told_and_leads_to_less_energy() -> None:
 
 
 def test_pose_out_of_reach_leaves_the_tracker_where_it_was() -> None:
-    """And the next update goes on from there."""
+    """The next update continues from the shape before the failure."""
     tracker = fb.Tracker(example())
     before = tracker.update(*way(40)[3])
     position = tracker.position
@@ -158,17 +158,17 @@ def test_boards_of_all_kinds_are_followed(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("position", "rotation", "said"),
+    ("position", "rotation", "words"),
     [
         ([0.0, 0.5], [0.0, 0.0, 0.0], r"position: found shape \(2,\), allowed \(3,\)"),
         ([0.0, 0.5, 0.0], np.eye(3), r"rotation: found shape \(3, 3\), allowed \(3,\)"),
         ([0.0, float("nan"), 0.0], [0.0, 0.0, 0.0], r"position: found .*nan.*, allowed finite numbers"),
     ],
 )
-def test_what_is_no_pose_is_refused(position: Any, rotation: Any, said: str) -> None:
-    """In one line; the tracker is not harmed."""
+def test_what_is_no_pose_is_refused(position: Any, rotation: Any, words: str) -> None:
+    """The refusal is one line, and the tracker stays usable."""
     tracker = fb.Tracker(example())
-    with pytest.raises(fb.InvalidArgument, match=said):
+    with pytest.raises(fb.InvalidArgument, match=words):
         tracker.update(position, rotation)
     assert tracker.update(END, [0.0, 0.0, 0.0]).status == "converged"
 

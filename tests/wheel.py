@@ -1,4 +1,4 @@
-"""What `make wheel` built: is it whole, does it hold nothing else, and does it run where there is no cargo?"""
+"""Checks the wheel of `make wheel`: it has all files and no others, and runs without cargo."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def check_names(contents: dict[str, bytes]) -> None:
 
 
 def check_paths(contents: dict[str, bytes]) -> None:
-    """No place on this machine is told."""
+    """The wheel has no path of this machine."""
     places = {str(Path.home()), str(ROOT), os.environ.get("CARGO_HOME", ""), tempfile.gettempdir()} - {"", "/"}
     for name, content in contents.items():
         for place in places:
@@ -53,7 +53,7 @@ def check_paths(contents: dict[str, bytes]) -> None:
 
 
 def check_glibc(wheel: str, contents: dict[str, bytes]) -> None:
-    """Nothing is needed that is younger than what the wheel's name promises."""
+    """The core needs no symbol of a younger glibc than the name of the wheel promises."""
     promised = re.search(r"manylinux_(\d+)_(\d+)_", wheel)
     if promised is None:
         return
@@ -64,7 +64,7 @@ def check_glibc(wheel: str, contents: dict[str, bytes]) -> None:
 
 
 def run(wheel: Path) -> None:
-    """Installs it into an empty environment, and solves there what comes with it."""
+    """Installs the wheel into an empty environment, and solves a shipped scenario there."""
     OUT.mkdir(parents=True, exist_ok=True)
     for file in OUT.iterdir():
         file.unlink()

@@ -1,1 +1,1 @@
-"""How fast fishbone is beside what one would use instead of it: `make bench`."""
+"""Times of fishbone and of its alternatives: `make bench`."""

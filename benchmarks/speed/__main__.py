@@ -1,4 +1,4 @@
-"""Measures how fast fishbone is beside what one would use instead of it: `make bench`.
+"""Measures the times of fishbone and of its alternatives: `make bench`.
 
     python -m speed [--only cold warm …] [--dry-run]
 
@@ -26,7 +26,7 @@ PACKAGES = ("fishbone", "casadi", "mujoco", "scipy", "numpy")
 
 
 def about() -> dict[str, Any]:
-    """Where, when and with what."""
+    """Machine, date and versions of the run."""
     commit = subprocess.run(
         ["git", "describe", "--always", "--dirty"],  # noqa: S607
         cwd=ROOT,

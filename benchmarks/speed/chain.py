@@ -1,4 +1,4 @@
-"""MuJoCo: a chain of rigid links, let go and waited for until it rests; what a robot programmer has at hand.
+"""MuJoCo: a chain of rigid links, simulated until it rests, as a robot programmer would do.
 
 The elasticity plugin of MuJoCo 2 and 3, a cable, is not in MuJoCo 4, so this is that cable by hand: between two links a
 hinge about ζ and one about η, with the belt's rigidity and its torsional rigidity as springs, none about ξ. Such a rod
@@ -24,11 +24,11 @@ STEP = 0.02
 DAMPING = 0.03
 """Damping over stiffness [s]; with it the chain comes to rest soonest."""
 INERTIA = 0.01
-"""Added to every hinge: it changes the way to rest and not the rest, and lets the steps be long."""
+"""Added to every hinge: it changes the motion but not the shape at rest, and allows long steps."""
 REST = 1e-4
 """Largest rate of a hinge at rest [rad/s]."""
 BETWEEN = 10
-"""Steps from one look at the rates to the next."""
+"""Steps between checks of the rates."""
 MOST = 2000
 HELD = 1e-3
 """Distance [U] between the chain's end and its clamp above which it is not held."""
@@ -69,7 +69,7 @@ class Chain:
         self.length = LENGTH / LINKS
         self.model: Any = mujoco.MjModel.from_xml_string(_model(self.length))
         self.state: Any = mujoco.MjData(self.model)
-        # A chain that flies apart is told of by `state.warning`; MuJoCo would write a file of its own besides.
+        # `state.warning` reports a chain that flies apart; MuJoCo would also write a file of its own.
         mujoco.set_mju_user_warning(lambda _: None)
 
     def cold(self, pose: Pose) -> Answer:
@@ -79,7 +79,7 @@ class Chain:
         return self.warm(pose)
 
     def warm(self, pose: Pose) -> Answer:
-        """From where the chain is."""
+        """From the current shape of the chain."""
         self.state.mocap_pos[0] = pose.position
         self.state.mocap_quat[0] = Rotation.from_rotvec(pose.rotation).as_quat(scalar_first=True)
         seconds, steps = timed(self._rest)

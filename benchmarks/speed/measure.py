@@ -1,4 +1,4 @@
-"""What is measured. Every section is a list of plain records, or one, as they stand in results/speed.json."""
+"""The measurements. Every section is a list of plain records, or one record, as in results/speed.json."""
 
 from __future__ import annotations
 
@@ -40,21 +40,21 @@ RANDOM_POSES = 40
 PATIENCE = 60.0
 """A rival solves random poses for so many seconds at most."""
 PATH = 10_000
-"""Poses of the path; a rival of fewer updates does stretches of it, in the same steps."""
+"""Poses of the path; a rival of fewer updates solves stretches of the path, in the same steps."""
 STRETCH = 20
 PASSES = 3
-"""Times of the whole path: of each update the least counts, since the rest is what else the machine did."""
+"""Passes along the whole path; the least time of each update counts, free of the load of the machine."""
 FINER = 10
-"""Steps to check a branch by, of one along the path."""
+"""Steps of the check of a branch for one step along the path."""
 MESHES = (100, 1000, 10_000)
 BATCH = 10_000
 ENERGY: Energy = "fishbone"
-"""Of the examples, and so of the warm updates."""
+"""Seed of the paths."""
 RANDOM_ENERGY: Energy = "wunderlich"
 MORE_SOLVES, MORE_UPDATES = 6, 101
-"""Of what instructions are counted; the more, the less it matters what else a process does."""
+"""Numbers of solves and updates whose instructions are counted; more reduce the share of the start of the process."""
 SAME_COUNT = {"PYTHONHASHSEED": "0", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-"""Without these no two counts are alike: strings hash otherwise, and idle threads of BLAS count while they wait."""
+"""Environment of equal counts: else strings hash differently, and waiting threads of BLAS count."""
 HERE = ROOT / "benchmarks"
 SAME = 1e-6
 """Relative difference of energies up to which two shapes count as the same."""
@@ -145,7 +145,7 @@ def random() -> list[Record]:
 
 
 def _compared(answers: Sequence[Answer], energies: Sequence[float]) -> dict[str, int]:
-    """How many of the converged shapes are fishbone's, how many are of less energy, how many of more."""
+    """Numbers of converged shapes with fishbone's energy, with less and with more."""
     pairs = zip(answers, energies, strict=False)
     apart = np.array([answer.energy / energy - 1.0 for answer, energy in pairs if answer.converged])
     lower, higher = int(np.sum(apart < -SAME)), int(np.sum(apart > SAME))
@@ -227,7 +227,7 @@ def _branch(energy: Energy, example: str) -> Record:
 
 
 def derivatives() -> list[Record]:
-    """Time of what is had from the factorised system, against an iteration of the solve."""
+    """Times of factorisation and products of a sensitivity, and of an iteration of the solve."""
     return [_derivatives(example) for example in _progress(EXAMPLES, "derivatives")]
 
 
@@ -268,8 +268,8 @@ def batch() -> list[Record]:
 
 def _in_process(*arguments: str, **environment: str) -> Record:
     command = [sys.executable, "-m", "speed.process", *arguments]
-    told = subprocess.run(command, check=True, capture_output=True, text=True, env=os.environ | environment)
-    record: Record = json.loads(told.stdout)
+    run = subprocess.run(command, check=True, capture_output=True, text=True, env=os.environ | environment)
+    record: Record = json.loads(run.stdout)
     return record
 
 
@@ -282,29 +282,29 @@ def instructions() -> list[Record]:
 
 
 def cold_instructions(example: str, python: str = sys.executable) -> int:
-    """Of one solve of an example as it is shipped, by the fishbone that this Python has."""
+    """Instructions of one solve of a shipped example, by the fishbone of this Python."""
     return _instructions(python, "solve", example, MORE_SOLVES)
 
 
 def warm_instructions(example: str, python: str = sys.executable) -> int:
-    """Of one update on the path, as the mean over the first of them."""
+    """Instructions of one update on the path, the mean over the first updates."""
     poses = itertools.islice(path(example, PATH + 1), MORE_UPDATES)
     given = json.dumps([[pose.position.tolist(), pose.rotation.tolist()] for pose in poses])
     return _instructions(python, "update", example, MORE_UPDATES, given)
 
 
 def _instructions(python: str, task: str, example: str, more: int, given: str = "") -> int:
-    """By callgrind: of a process that does its task so many times less one that does it once, for each time more."""
+    """Instructions of a task, by callgrind: those of `more` tasks in a process less those of one, per task."""
     once, often = (_counted([python, "-m", "speed.process", task, example, str(times)], given) for times in (1, more))
     return round((often - once) / (more - 1))
 
 
 def _counted(command: list[str], given: str) -> int:
     command = ["valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null", *command]
-    told = subprocess.run(
+    run = subprocess.run(
         command, check=True, capture_output=True, text=True, input=given, cwd=HERE, env=os.environ | SAME_COUNT
     )
-    found = re.search(r"Collected : (\d+)", told.stderr)
+    found = re.search(r"Collected : (\d+)", run.stderr)
     assert found is not None
     return int(found[1])
 

@@ -39,7 +39,7 @@ PUSHES = (
 
 
 class Nlp:
-    """A programme with one solver for cold starts and one, of other settings, for warm ones."""
+    """A programme with a solver for cold starts and a solver with other settings for warm starts."""
 
     def __init__(self, programme: Programme, cold: Solver, warm: Solver) -> None:
         self.programme, self.solvers = programme, {"cold": cold, "warm": warm}
@@ -63,8 +63,8 @@ class Nlp:
         solver: Any = self.solvers[start]
         parameters = self.programme.parameters(pose)
         seconds, self.found = timed(solver, p=parameters, **self.bounds, **given)
-        told = solver.stats()
-        return Answer(bool(told["success"]), seconds, int(told["iter_count"]), float(self.found["f"]))
+        statistics = solver.stats()
+        return Answer(bool(statistics["success"]), seconds, int(statistics["iter_count"]), float(self.found["f"]))
 
     def curve(self) -> tuple[Floats, Floats]:
         """Positions and tangents of the last answer."""
@@ -72,7 +72,7 @@ class Nlp:
 
 
 def ipopt_interpreted(energy: Energy, elements: int) -> Nlp:
-    """CasADi finds the derivatives of the whole, expanded to scalars, and interprets them."""
+    """CasADi derives the whole programme, expanded to scalars, and interprets the derivatives."""
     programme = Programme(Form.NODAL, energy, elements)
     return _ipopt(programme, programme.plain(), {"expand": True})
 

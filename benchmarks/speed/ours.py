@@ -20,7 +20,7 @@ class Intrinsic:
         self.elements = elements
 
     def cold(self, pose: Pose) -> Answer:
-        """One `fb.solve`, and a tracker for what comes next."""
+        """One `fb.solve`, and a tracker for the updates that follow."""
         given = scenario(self.energy, self.elements, pose)
         seconds, self.belt = timed(fb.solve, given)
         self.tracker: fb.Tracker | None = None

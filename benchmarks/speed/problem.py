@@ -1,4 +1,4 @@
-"""What every rival is given and what it hands back; the poses along which warm updates are measured."""
+"""Input and output of every rival; the poses of the warm updates."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ TOLERANCE = 1e-8
 WAVES = 3
 """Harmonics of the path."""
 TRANSLATION, ROTATION = 0.05, 0.2
-"""How far the path strays from the example's end pose: U, rad."""
+"""Largest distance of the path from the example's end pose: U, rad."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Pose:
 
 @dataclass(frozen=True)
 class Answer:
-    """Whether a rival found a shape, in what time, and the shape's energy."""
+    """The answer of a rival: whether it converged, its time, its iterations and the energy of its shape."""
 
     converged: bool
     seconds: float
@@ -54,7 +54,7 @@ class Rival(Protocol):
         """From the rival's own guess, which the clock leaves out where it is not part of the solver."""
 
     def warm(self, pose: Pose) -> Answer:
-        """From its last answer."""
+        """From the last answer of the rival."""
 
     def curve(self) -> tuple[Floats, Floats]:
         """Positions and tangents of the last cold answer, (n, 3) each, at equal distances from the start to the end."""
@@ -72,7 +72,7 @@ def scenario(energy: Energy, elements: int, pose: Pose) -> fb.Scenario:
 
 
 def end_pose(example: str) -> Pose:
-    """Where a shipped example ends."""
+    """The end pose of a shipped example."""
     end = fb.load(ROOT / "scenarios" / f"{example}.toml").to_dict()["supports"][1]
     return Pose(np.array(end["position"]), np.array(end["rotation"]))
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 COARSE = 80
-"""Elements of the mesh by way of which finer ones are solved."""
+"""Elements of the mesh from whose solution finer meshes are solved."""
 REPETITIONS = 5
 
 
@@ -32,13 +32,13 @@ def _example(name: str, **solver: int) -> fb.Scenario:
 
 def _peak() -> float:
     """Largest memory of this process so far [MB]; getrusage would count that of the process which started it."""
-    told = re.search(r"VmHWM:\s*(\d+) kB", Path("/proc/self/status").read_text())
-    assert told is not None
-    return int(told[1]) / 1024.0
+    found = re.search(r"VmHWM:\s*(\d+) kB", Path("/proc/self/status").read_text())
+    assert found is not None
+    return int(found[1]) / 1024.0
 
 
 def mesh(elements: str) -> dict[str, Any]:
-    """Time of an iteration on a mesh, without those on the coarse one on the way to it; and memory."""
+    """Time of an iteration on a mesh, without the iterations on the coarse mesh before; and memory."""
     fine, coarse = (_example("example1", elements=count) for count in (int(elements), COARSE))
     before = _peak()
     fb.solve(fine, strict=True)
@@ -58,7 +58,7 @@ def _solved(scenario: fb.Scenario) -> tuple[int, float]:
 
 
 def batch(count: str) -> dict[str, Any]:
-    """Random poses at once, on as many threads as the environment says."""
+    """Random poses at once, on the number of threads set by the environment."""
     import numpy as np  # noqa: PLC0415 - not for the count of instructions
 
     import random_poses  # noqa: PLC0415

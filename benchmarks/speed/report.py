@@ -41,7 +41,7 @@ def significant(value: float, digits: int = 3) -> str:
 
 
 def ratio(value: float, ours: float | None) -> str:
-    """How many times ours."""
+    """The ratio to our value."""
     return "" if ours is None else f"{significant(value / ours, 2)} ×"
 
 
@@ -113,7 +113,7 @@ def branch_rows(result: Record) -> Rows:
 
 
 def derivative_rows(result: Record) -> Rows:
-    """One row an example: times, and what they are in iterations."""
+    """One row an example: times, and times in iterations."""
     return [
         [
             r["example"],
@@ -174,7 +174,7 @@ COLD = [
 ]
 RANDOM = ["", "poses", "converged", "our shape", "of less energy", "of more", "p50 [ms]", "over ours"]
 WARM = ["", "updates", "failed", "iterations", "p50 [ms]", "p99", "p99.9", "p50 over ours"]
-BRANCHES = ["", "updates", "on another branch", "snaps told"]
+BRANCHES = ["", "updates", "on another branch", "snaps reported"]
 DERIVATIVES = ["µs (iterations)", "iteration", "factorise", "forward product", "adjoint product", "Jacobian"]
 SCALING = ["elements", "iterations", "ms an iteration", "µs an iteration and element", "memory [MB]", "kB an element"]
 BATCH = ["threads", "scenarios", "converged", "time [s]", "a second", "speed-up"]
@@ -197,13 +197,13 @@ def sections(result: Record) -> Iterator[tuple[str, list[str], Rows]]:
 
 
 def text(header: list[str], rows: Rows) -> str:
-    """A table of the page; a section that was not run says so."""
+    """A table of the page, or a sentence for a section that was not run."""
     return table(header, rows) if rows else "Not measured."
 
 
 def machine_rows(result: Record) -> Rows:
-    """Where, when and with what it was measured."""
-    threads = f"{result['threads']}, unless said otherwise"
+    """Machine, date and versions of the run."""
+    threads = f"{result['threads']}, unless stated otherwise"
     return [
         ["processor", f"{result['processor']}, {result['cores']} cores, {result['system']}"],
         ["threads", threads],

@@ -1,4 +1,4 @@
-"""Who takes part, and with what."""
+"""The programs compared, with their settings."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Entry:
-    """A rival by name, where it is made, and what it is asked to do."""
+    """A rival: its name, its constructor and its measurements."""
 
     name: str
     module: str
@@ -22,7 +22,7 @@ class Entry:
     is_other_model: bool = False
     """Whether its energy is not that of the core."""
     updates: int = 0
-    """Warm updates that are measured: fewer of a slow rival, none of one that has no warm start."""
+    """Number of warm updates: fewer of a slow rival, none of a rival without a warm start."""
 
     def build(self, energy: Energy, elements: int) -> Rival:
         """The rival, ready to start."""

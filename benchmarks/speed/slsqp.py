@@ -1,4 +1,4 @@
-"""SciPy's SLSQP on the core's own discrete programme, in NumPy: what one writes without a tool for optimal control.
+"""SciPy's SLSQP on the core's own discrete programme, in NumPy, as written without a tool for optimal control.
 
 The fields at the nodes are the only unknowns, the pose is carried along the belt; all derivatives are exact, those of
 an element by complex steps, all elements at once. `solve_bvp` is no choice here: along a part of both examples the ribs
@@ -114,7 +114,7 @@ class Slsqp:
     def warm(self, pose: Pose) -> Answer:
         """From the last shape; the estimate of the Hessian begins anew."""
         ends = {"type": "eq", "fun": self._miss, "jac": self._miss_slope, "args": (pose,)}
-        seconds, told = timed(
+        seconds, found = timed(
             minimize,
             self._cost,
             self.found,
@@ -124,8 +124,8 @@ class Slsqp:
             bounds=self.bounds,
             options={"maxiter": ITERATIONS, "ftol": 1e-12},
         )
-        self.found = told.x
-        return Answer(bool(told.success), seconds, int(told.nit), float(told.fun))
+        self.found = found.x
+        return Answer(bool(found.success), seconds, int(found.nit), float(found.fun))
 
     def curve(self) -> tuple[Floats, Floats]:
         """Positions and tangents of the last answer."""

@@ -91,7 +91,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> ModuleType:
-    """`plot` and `export`, imported when first asked for: they need extra packages and take their time."""
+    """`plot` and `export`, imported at first use: they need extra packages, which take long to import."""
     if name in {"plot", "export"}:
         return importlib.import_module(f"fishbone.{name}")
     raise AttributeError(f"module 'fishbone' has no attribute {name!r}")

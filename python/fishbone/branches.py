@@ -1,4 +1,4 @@
-"""All equilibria of a scenario that can be found."""
+"""The search for all equilibria of a scenario."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ class _Budget(NamedTuple):
 
 
 def branches(scenario: Scenario, *, progress: Callable[[int, int], object] | None = None) -> list[Equilibrium]:
-    """The equilibria of a scenario, rising in energy: minima, and saddles with one or two negative modes.
+    """The equilibria found of a scenario, rising in energy: minima, and saddles with one or two negative modes.
 
-    More than 4100 searches, from waves of bend and rib slope over the length of the belt, find minima, and displaced
-    along their lowest modes these lead to more. The 16 lowest of what is found are pushed along their lowest modes,
-    which leads on to saddles, and from these it is downhill to either side. What a mesh twice as fine does not have is
-    left out, and of what the mesh does not tell apart the lowest is kept. Of shapes that are mirror images
-    of each other the one is given that bulges as the scenario asks. No belt is kept from passing through itself on
-    the way: `Equilibrium.crosses_itself` tells which end so. The same scenario gives the same equilibria. Where there
-    are none, the one outcome of `solve` says why.
+    More than 4100 searches, from waves of bend and rib slope over the length of the belt, find minima. Perturbations of
+    these minima along their lowest modes lead to more minima. Continuation in modal loads leads from the 16 lowest
+    equilibria to saddles, and the solver goes downhill from each saddle to either side. Equilibria that are unconfirmed
+    on refinement, by a mesh twice as fine, are left out; of equilibria that the mesh does not resolve the lowest is
+    kept. Of two mirror images the list has the one on the side of the scenario's `bulge`. A belt may pass through
+    itself during the search: check `Equilibrium.crosses_itself`. The same scenario has the same list. Where no
+    equilibrium is found the list has the failed result of `solve`, with its message.
 
-    `progress(done, planned)` is called now and then from the calling thread, in tasks. All cores are used, other
-    threads run meanwhile, and Ctrl-C ends the search.
+    `progress(done, planned)` is called from the calling thread during the search; both are numbers of tasks. All cores
+    are used, other threads run meanwhile, and Ctrl-C ends the search.
 
-    Errors: `InvalidArgument` where `scenario` is none; whatever `progress` raises.
+    Errors: `InvalidArgument` where `scenario` is no scenario; any error that `progress` raises.
     """
     return _search(scenario, None, progress)
 

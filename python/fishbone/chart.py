@@ -27,7 +27,7 @@ LINES: dict[bool | None, tuple[str, Style]] = {
     False: ("unstable", {"linestyle": (0, (3.0, 1.8)), "linewidth": 0.9}),
     None: ("undecided", {"linestyle": ":", "linewidth": 1.3}),
 }
-"""What a stretch is called and drawn with, by whether it is stable."""
+"""Label and style of a stretch of a branch, by `stable`."""
 _MARKER: Style = {"linestyle": "", "markersize": 5.0, "markeredgecolor": "black", "markeredgewidth": 0.8, "zorder": 4}
 MARKERS: dict[Kind, Style] = {
     "fold": {"marker": "o", "markerfacecolor": "white", **_MARKER},
@@ -44,26 +44,26 @@ SNAP: Style = {
     "shrinkB": 0.0,
 }
 SHORTEST_SNAP = 0.02
-"""An arrow shorter than this share of an axis is not drawn: there another branch takes over without a jump."""
+"""Length, as a share of an axis, below which an arrow is not drawn: there another branch continues without a jump."""
 LANDED: Style = {"linestyle": "", "marker": ".", "markersize": 4.0, "color": "0.35", "zorder": 3}
 MAX_NAMED = 10
-"""The key names no more branches than this: their colours could not be told apart."""
+"""Greatest number of branches in the key: the colours of more branches are not distinguishable."""
 COLORS = ("viridis", 0.1, 0.8)
-"""A colour map whose lightness rises steadily, so that branches stay apart in grey, and the part of it to use."""
+"""A colour map of monotonic lightness, for prints in grey, and the lowest and highest value used."""
 
 
 class Panel(NamedTuple):
-    """A quantity to be drawn over the parameter."""
+    """A quantity drawn over the parameter."""
 
     label: str
     along: Callable[[Branch], Floats]
-    """Its values in the states of a branch."""
+    """The values of the quantity in the states of a branch."""
     at: Callable[[Equilibrium], float]
-    """Its value in an equilibrium."""
+    """The value of the quantity in an equilibrium."""
 
 
 def panels(diagram: Diagram, support: Place | None) -> Iterator[Panel]:
-    """Energy, height, the force of a support where there is one, tightest bend on the spine, and rib margin.
+    """Panels of energy, height, the force of a support if there is one, tightest bend on the spine, and rib margin.
 
     Errors: `NoSupport`.
     """
@@ -89,13 +89,13 @@ def panels(diagram: Diagram, support: Place | None) -> Iterator[Panel]:
 
 
 def draw(axes: Axes, diagram: Diagram, panel: Panel) -> bool:
-    """Draws a quantity over the parameter: the branches, their events, and snaps; says whether any can be seen."""
+    """Draws a quantity over the parameter: branches, events and snaps; returns whether an arrow of a snap is drawn."""
     curves = [np.column_stack([branch.parameter, panel.along(branch)]) for branch in diagram.branches]
     for branch, curve, color in zip(diagram.branches, curves, colors(diagram), strict=True):
         for states, is_stable in runs(branch):
             axes.plot(*curve[states].T, color=color, **LINES[is_stable][1])
         if branch.origin is not None:
-            # The first state is a little off the event.
+            # A line joins the event with the first state, which is a little off it.
             event = diagram.branches[branch.origin.branch].events[branch.origin.event]
             root = np.array([curves[branch.origin.branch][event.state], curve[0]])
             axes.plot(*root.T, color=color, **LINES[branch.stable[0]][1])
@@ -116,9 +116,9 @@ def draw(axes: Axes, diagram: Diagram, panel: Panel) -> bool:
 
 
 def runs(branch: Branch) -> Iterator[tuple[slice, bool | None]]:
-    """The stretches of a branch that are stable throughout, or not, or undecided, as their states.
+    """The stretches of a branch that are stable, unstable or undecided throughout, as slices of its states.
 
-    In the very state of an event that is a matter of rounding: what counts is what is before it and beyond.
+    Rounding decides `stable` in the state of an event: the stretches before and after it have its numbers of modes.
     """
     behind, ahead = branch.negative_modes, branch.negative_modes
     for event in branch.events:
@@ -134,7 +134,7 @@ def runs(branch: Branch) -> Iterator[tuple[slice, bool | None]]:
 
 
 def colors(diagram: Diagram) -> list[Any]:
-    """One for each branch; black where there is only one."""
+    """A colour for each branch; black if there is only one."""
     if len(diagram.branches) == 1:
         return ["black"]
     name, darkest, lightest = COLORS
@@ -142,7 +142,7 @@ def colors(diagram: Diagram) -> list[Any]:
 
 
 def key(diagram: Diagram, *, snaps: bool) -> Iterator[Line2D]:
-    """What lines, markers and arrows mean, of those that the picture has."""
+    """The key of the lines, markers and arrows in the picture."""
     stretches = {is_stable for branch in diagram.branches for _, is_stable in runs(branch)}
     kinds = {event.kind for branch in diagram.branches for event in branch.events}
     for is_stable, (label, style) in LINES.items():
@@ -161,7 +161,7 @@ def key(diagram: Diagram, *, snaps: bool) -> Iterator[Line2D]:
 def _snaps(
     diagram: Diagram, panel: Panel, curves: list[Floats]
 ) -> Iterator[tuple[tuple[float, float], tuple[float, float]]]:
-    """From where to where the belt snaps."""
+    """The points before and after each snap."""
     for branch, curve in zip(diagram.branches, curves, strict=True):
         for event in branch.events:
             if event.snapped is not None and event.snapped_parameter is not None:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 class Failure(click.ClickException):
-    """An end other than success: one line, and an exit code by its class."""
+    """A command failed: one line of error, and an exit code for each class."""
 
     exit_code = 1
 
@@ -39,19 +39,19 @@ class Invalid(Failure):
 
 
 class NoEquilibrium(Failure):
-    """The solve ended without an equilibrium, or there is none to follow."""
+    """The solve ended without an equilibrium, or `follow` has no equilibrium to start from."""
 
     exit_code = 3
 
 
 class Interrupted(Failure):
-    """Ctrl-C; the exit code is the shell's own for it."""
+    """Ctrl-C was pressed; the exit code is that of shells."""
 
     exit_code = 130
 
 
 def _output(*suffixes: str) -> Callable[[click.Context, click.Parameter, Path | None], Path | None]:
-    """A check of a file to write, so that it is refused before the solve rather than after it."""
+    """A check of an output file, so that an invalid path is refused before the solve."""
 
     def check(ctx: click.Context, param: click.Parameter, path: Path | None) -> Path | None:
         obstacle = None if path is None else check_writable(path, suffixes)
@@ -67,7 +67,7 @@ _WIDE = 160
 
 
 class Commands(click.Group):
-    """Turns every end of a command into an exit code and one line."""
+    """Converts errors and interrupts of a command into an exit code and one line."""
 
     def invoke(self, ctx: click.Context) -> Any:  # noqa: ANN401 - as in click
         """Runs the command."""
@@ -103,15 +103,15 @@ def command(context: click.Context) -> None:
     callback=_output(".stl", ".ply", ".obj", ".glb"),
     help="Write the surface: .stl, .ply, .obj or .glb.",
 )
-@click.option("--all", "is_all", is_flag=True, help="Find all equilibria, saddles too, and not one minimum alone.")
+@click.option("--all", "is_all", is_flag=True, help="Search for all equilibria, saddles included, not for one minimum.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON instead of a table.")
 def solve(  # noqa: PLR0913 - one for each option
     file: Path, *, out: Path | None, figure: Path | None, mesh: Path | None, is_all: bool, as_json: bool
 ) -> None:
     """Solve a scenario.
 
-    FILE is .toml or .json; what came out is printed as a table. With --all that has a row for each equilibrium, the
-    result is a list of them, and the figure shows them side by side.
+    FILE is .toml or .json; the result is printed as a table. With --all the table has a row for each equilibrium, the
+    result is a list of equilibria, and the figure shows them side by side.
 
     Exit code: 0 converged, 2 invalid input, 3 infeasible or not converged.
     """
@@ -122,7 +122,7 @@ def solve(  # noqa: PLR0913 - one for each option
     scenario = fishbone.load(file)
     found = _all(scenario) if is_all else [fishbone.solve(scenario)]
     converged = [equilibrium for equilibrium in found if equilibrium.status == "converged"]
-    # All is made before anything is written, so that a failure leaves nothing behind.
+    # All contents are made before a file is written, so that a failure leaves no file behind.
     contents = {}
     text = _encode_found(found, is_all=is_all) if as_json or out is not None else ""
     if out is not None:
@@ -151,9 +151,9 @@ def _spare(file: Path, out: Path | None) -> None:
 
 
 def _pictures(figure: Path | None, mesh: Path | None) -> list[tuple[Path, Callable[[Any, str], bytes]]]:
-    """What is to be drawn, and how; asked before the solve, so that a package that is missing is missed then."""
+    """The files to draw, with their encoders; called before the solve, so that a missing package is reported then."""
     pictures: list[tuple[Path, Callable[[Any, str], bytes]]] = []
-    # Whoever wants no picture does not wait for these imports.
+    # These imports take long, and are needed for pictures only.
     if figure is not None:
         from fishbone import plot  # noqa: PLC0415
 
@@ -166,7 +166,7 @@ def _pictures(figure: Path | None, mesh: Path | None) -> list[tuple[Path, Callab
 
 
 def encode(result: dict[str, Any]) -> str:
-    """A result as JSON, one line for each field: short to read, quick to compare."""
+    """A result as JSON, one line for each field, so that results can be read and compared line by line."""
     fields = (f"{json.dumps(key)}: {json.dumps(value)}" for key, value in result.items())
     return "{\n" + ",\n".join(fields) + "\n}\n"
 
@@ -194,7 +194,7 @@ def _write(path: Path, content: bytes) -> None:
 
 
 def _reason(equilibrium: Equilibrium) -> str:
-    """Why a solve ended without an equilibrium."""
+    """The status and the message of a failed solve in one line."""
     return f"{equilibrium.status.replace('_', ' ')}: {' '.join(equilibrium.message.split())}"
 
 
@@ -205,7 +205,7 @@ def _print(equilibria: list[Equilibrium], *, is_all: bool) -> None:
 
 
 def _console() -> Console:
-    """What tables are printed to: as wide as they need where that is no terminal."""
+    """The console for tables, of a fixed width where standard output is no terminal."""
     from rich.console import Console  # noqa: PLC0415
 
     console = Console(highlight=False)
@@ -213,9 +213,9 @@ def _console() -> Console:
 
 
 def _warn(file: Path, equilibria: list[Equilibrium]) -> None:
-    """Passes warnings on, each once. Of several equilibria a saddle is expected, and the table tells of it."""
-    told = equilibria if len(equilibria) == 1 else [one for one in equilibria if one.stable is not False]
-    for warning in dict.fromkeys(warning for equilibrium in told for warning in equilibrium.warnings):
+    """Prints warnings, each once. Of several equilibria the saddles are left out: the table marks them."""
+    shown = equilibria if len(equilibria) == 1 else [one for one in equilibria if one.stable is not False]
+    for warning in dict.fromkeys(warning for equilibrium in shown for warning in equilibrium.warnings):
         click.echo(f"fishbone: {file}: warning: {warning}", err=True)
 
 
@@ -234,13 +234,13 @@ def _warn(file: Path, equilibria: list[Equilibrium]) -> None:
     "poses",
     multiple=True,
     metavar='"X Y Z RX RY RZ"',
-    help="A pose to lead a support to: position and rotation vector. May be repeated: one after the other.",
+    help="A pose of the support: position and rotation vector. May be repeated: one pose after the other.",
 )
-@click.option("--support", metavar="PLACE", help='Which support to lead: "start", "end", index or arc length.  [end]')
-@click.option("--screw", is_flag=True, help="Lead it from pose to pose as a screw turns, not straight.")
-@click.option("--step", type=float, default=0.05, show_default=True, help="The longest step along a branch.")
-@click.option("--states", type=int, default=1000, show_default=True, help="The most states of a branch.")
-@click.option("--branches", type=int, default=10, show_default=True, help="The most branches.")
+@click.option("--support", metavar="PLACE", help='The support of --pose: "start", "end", index or arc length.  [end]')
+@click.option("--screw", is_flag=True, help="Move the support from pose to pose along a screw, not straight.")
+@click.option("--step", type=float, default=0.05, show_default=True, help="Greatest step length along a branch.")
+@click.option("--states", type=int, default=1000, show_default=True, help="Greatest number of states of a branch.")
+@click.option("--branches", type=int, default=10, show_default=True, help="Greatest number of branches.")
 @click.option("--out", type=_PATH, callback=_output(".json"), help="Write all states: .json.")
 @click.option("--table", type=_PATH, callback=_output(".csv"), help="Write a report on all states: .csv.")
 @click.option(
@@ -267,8 +267,8 @@ def follow(  # noqa: PLR0913 - one for each option
 ) -> None:
     """Follow an equilibrium along a path.
 
-    FILE is .toml or .json. The path leads numbers of it to other values (--to), or a support through poses (--pose).
-    Branches are followed through folds and instabilities; they and their events are printed as tables.
+    FILE is .toml or .json. The path changes numbers of the scenario (--to), or leads a support through poses (--pose).
+    Branches are followed through folds and instabilities; tables of branches and events are printed.
 
     Exit code: 0 followed, 2 invalid input, 3 no equilibrium to begin with.
     """
@@ -286,9 +286,9 @@ def follow(  # noqa: PLR0913 - one for each option
         for index, branch in enumerate(diagram.branches):
             if progress is not None:
                 progress(index, len(diagram.branches))
-            # Computed here and kept.
+            # The branch computes and keeps its quantities at the first access.
             _ = branch.energy
-    # All is made before anything is written, so that a failure leaves nothing behind.
+    # All contents are made before a file is written, so that a failure leaves no file behind.
     contents = {}
     text = encode(diagram.to_dict()) if as_json or out is not None else ""
     if out is not None:
@@ -360,7 +360,7 @@ def _place(text: str) -> Place:
 def _progress(
     read: Callable[[int, float], tuple[str, float, float]],
 ) -> Iterator[Callable[[int, float], object] | None]:
-    """What shows how far it has come, on a terminal; `read` turns what it is told into words, what is done, and all."""
+    """A progress bar on a terminal, else None; `read` turns the arguments of a call into text, done and total."""
     from rich.console import Console  # noqa: PLC0415
 
     console = Console(stderr=True)
@@ -433,7 +433,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _fail(Failure.exit_code, str(error))
     except SystemExit:
         raise
-    except BaseException as error:  # a panic of the core is no Exception
+    except BaseException as error:  # a panic of the core is not an Exception
         return _fail(Failure.exit_code, f"internal error, please report it: {type(error).__name__}: {error}")
     return code if isinstance(code, int) else 0
 

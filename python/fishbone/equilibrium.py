@@ -1,4 +1,4 @@
-"""Equilibria: what a solve ends with."""
+"""Equilibria: the results of a solve."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 MIN_ACROSS, MAX_ACROSS = 2, 10_001
-"""Ribs are straight: two points hold all there is to a rib, and more are for rendering."""
+"""Points on a rib. Ribs are straight: two points determine a rib, further points are for rendering."""
 
 MAX_MODES = 100
-"""More than what a mesh resolves."""
+"""Number of modes, more than a mesh resolves."""
 
 MAX_REACH = 10.0
-"""Farther than any support of a belt of length 1 needs to go."""
+"""Displacement in U and rotation in rad, farther than any support of a belt needs to move."""
 
 
 class Reaction(NamedTuple):
-    """What a support does to the belt, world axes.
+    """Force and moment of a support on the belt, world axes.
 
     Shapes: (3,) each.
     Units: force [N], moment about the support point [N·m], in the scenario's own units.
@@ -45,7 +45,7 @@ class Reaction(NamedTuple):
 
 
 class Internal(NamedTuple):
-    """What the belt beyond u does to the part before it, world axes, the moment about the spine point.
+    """Force and moment of the belt beyond u on the part before u, world axes, the moment about the spine point.
 
     Shapes: (n, 3) each.
     """
@@ -75,11 +75,11 @@ class Outline(NamedTuple):
     plus: Floats
     """The edge on the +ζ side, from the start of the belt to its end."""
     loops: list[Floats]
-    """What to draw: one closed, counter-clockwise loop of an open belt; the two edges of a closed one."""
+    """The lines to draw: of an open belt one closed, counter-clockwise loop; of a closed belt its two edges."""
 
 
 class Residuals(NamedTuple):
-    """Max-norms of what an exact solution has at 0, with lengths in U and energy in mean R_f/U."""
+    """Max-norms of the residuals, 0 for an exact solution, with lengths in U and energy in mean R_f/U."""
 
     stationarity: float
     constraint: float
@@ -89,12 +89,12 @@ class Residuals(NamedTuple):
 class Mode(NamedTuple):
     """A motion from an equilibrium that the second variation of the energy does not couple with other modes.
 
-    Its scale is such that the mean over the board of the squared displacement is 1, the board taken as a strip across
-    the spine that turns with the frame, all of it weighing alike. n is the number of nodes.
+    The mean over the board of the squared displacement is 1. The board is taken as a strip across the spine, of uniform
+    mass, that turns with the frame. n is the number of nodes.
     """
 
     eigenvalue: float
-    """Second variation of the energy: twice what it rises by, per squared displacement."""
+    """Second variation of the energy: twice the rise of the energy, per squared displacement."""
     translation: Floats
     """Displacement of the spine, shape (n, 3)."""
     rotation: Floats
@@ -106,18 +106,18 @@ class Mode(NamedTuple):
 
 
 class SnapMargin(NamedTuple):
-    """Where a support may not be moved without the belt's losing its stability."""
+    """The nearest pose of a support at which the belt loses its stability."""
 
     distance: float
-    """How far it is: the norm of displacement in U and rotation in rad."""
+    """Distance of that pose: the norm of displacement in U and rotation in rad."""
     direction: Floats
-    """Where to: displacement in U and rotation left in world axes, of norm 1, shape (6,)."""
+    """Direction to that pose: displacement in U and left world-axes rotation, of norm 1, shape (6,)."""
     snaps: bool
-    """Whether the equilibrium ends there, in a fold; else it goes on, no longer stable, where others branch off."""
+    """True where the equilibrium ends, at a fold; False where it continues, unstable, and others branch off."""
     position: Floats
-    """Position of the support there, shape (3,)."""
+    """Position of the support at that pose, shape (3,)."""
     rotation: Floats
-    """Rotation vector of the support there, shape (3,)."""
+    """Rotation vector of the support at that pose, shape (3,)."""
 
 
 class HighestPoint(NamedTuple):
@@ -128,7 +128,7 @@ class HighestPoint(NamedTuple):
 
 
 class BendRadius(NamedTuple):
-    """The least radius of bend over the whole width, and where it is: u along the spine, v across."""
+    """The least bend radius over the whole width, and its place: u along the spine, v across."""
 
     value: float
     u: float
@@ -136,24 +136,24 @@ class BendRadius(NamedTuple):
 
 
 class SpineRadius(NamedTuple):
-    """The least radius of bend on the spine, and where it is."""
+    """The least bend radius on the spine, and its place."""
 
     value: float
     u: float
 
 
 class RibMargin(NamedTuple):
-    """How far the ribs are from crossing at an edge, least over u, and where."""
+    """The least slack of the rib bound, 2/V − |s|, and its place; s is the rib convergence."""
 
     value: float
     u: float
 
 
 class Equilibrium:
-    """The shape of a belt and all that is reported of it.
+    """The shape of a belt, with its forces, its stability and its residuals.
 
-    A solve that fails ends with one too: look at `status` before anything else. n is the number of nodes; a node
-    at a corner of the board comes twice, before and after it. Arrays are float64 in C order, and the caller's own.
+    A solve that fails also returns an `Equilibrium`: check `status` first. n is the number of nodes; a node at a corner
+    of the board comes twice, before and after the corner. Arrays are float64 in C order, and copies.
 
     Units: those of the scenario; angles in rad.
     """
@@ -172,12 +172,12 @@ class Equilibrium:
 
     @property
     def message(self) -> str:
-        """One line: why the solve ended so, and what to try."""
+        """One line: why the solve ended with this status, and what to try."""
         return self._inner.message
 
     @property
     def warnings(self) -> list[str]:
-        """What should be known before the result is relied on, one line each."""
+        """Reasons not to rely on the result, one line each."""
         return self._inner.warnings
 
     @property
@@ -197,21 +197,22 @@ class Equilibrium:
 
     @property
     def twist(self) -> float:
-        """Total torsion ∫ ω_η du [rad]: whole extra turns of the end show here and nowhere else."""
+        """Total torsion ∫ ω_η du [rad], the only quantity that shows whole extra turns of the end."""
         return self._inner.twist
 
     @property
     def stable(self) -> bool | None:
-        """Whether the equilibrium is a local minimum; None where that cannot be decided.
+        """Whether the equilibrium is a local minimum; None where the second variation does not decide.
 
-        So it is where it has a mode of no second variation, and where a part of the belt is flat under stress: there
-        any slope of the ribs is as good as any other, and along which of them the belt would give way is not seen.
+        It does not decide where it is zero along a mode, and where a part of the belt is flat under stress: there the
+        slope of the ribs costs no energy, and the count with square ribs does not show a loss of stability along
+        slanted ones.
         """
         return self._inner.stable
 
     @property
     def negative_modes(self) -> int | None:
-        """Number of independent motions, of those that supports and touching ribs leave, by which the energy falls."""
+        """Number of independent motions along which the energy falls, of those that supports and active ribs leave."""
         return self._inner.negative_modes
 
     @property
@@ -220,9 +221,9 @@ class Equilibrium:
         return self._inner.zero_modes
 
     def refined(self, elements: int) -> Equilibrium | None:
-        """The same equilibrium, stable or not, with another number of elements; None where there is none like it.
+        """The same equilibrium, stable or not, with another number of elements; None where none is found.
 
-        Errors: `InvalidArgument` where `elements` is none that a scenario takes.
+        Errors: `InvalidArgument` where a scenario may not have this number of elements.
         """
         tables = self.scenario.to_dict()
         tables["solver"]["elements"] = elements
@@ -234,7 +235,7 @@ class Equilibrium:
         return None if found is None else Equilibrium(scenario, found[1])
 
     def modes(self, count: int) -> list[Mode]:
-        """The lowest modes, rising: fewer where the mesh has no more.
+        """The `count` lowest modes, rising; fewer where the mesh has fewer.
 
         Errors: `NoModes` unless the solve has converged by the intrinsic method; `InvalidArgument` for a count below 1.
         """
@@ -254,7 +255,7 @@ class Equilibrium:
 
     @property
     def residuals(self) -> Residuals:
-        """How far the result is from an exact solution of its discrete equations."""
+        """The residuals of the discrete equations."""
         return Residuals(*self._inner.residuals)
 
     @property
@@ -320,7 +321,7 @@ class Equilibrium:
 
     @property
     def curvature(self) -> Floats:
-        """Principal curvature κ₁, the one that is not zero.
+        """Principal curvature κ₁, across the rib; the other principal curvature is zero.
 
         Shapes: (n,).
         Source: Eq. (29).
@@ -339,29 +340,29 @@ class Equilibrium:
 
     @property
     def highest_point(self) -> HighestPoint:
-        """The highest point of the spine."""
+        """The point of the spine farthest along the scenario's `bulge`."""
         u, position = self._inner.highest_point
         return HighestPoint(u, np.array(position))
 
     @property
     def least_bend_radius(self) -> BendRadius | None:
-        """The tightest bend of the whole belt, often at an edge; None where nothing bends.
+        """The least bend radius of the whole belt, often at an edge; None where nothing bends.
 
-        It falls with every refinement of the mesh, because ribs all but meet on an edge where the bend changes sign:
-        compare `least_spine_radius`.
+        The radius falls with every refinement of the mesh, because ribs all but meet on an edge where the bend changes
+        sign. `least_spine_radius` converges.
         """
         least = self._inner.least_bend_radius
         return None if least is None else BendRadius(*least)
 
     @property
     def least_spine_radius(self) -> SpineRadius | None:
-        """The tightest bend on the spine; None where nothing bends."""
+        """The least bend radius on the spine; None where nothing bends."""
         least = self._inner.least_spine_radius
         return None if least is None else SpineRadius(*least)
 
     @property
     def rib_margin(self) -> RibMargin:
-        """How far the ribs are from crossing inside the belt.
+        """The least slack of the rib bound; ribs cross inside the belt where it is negative.
 
         Source: Eq. (33).
         """
@@ -371,14 +372,14 @@ class Equilibrium:
     def crosses_itself(self) -> tuple[float, float] | None:
         """Arc lengths of the first two places that pass through each other; None where the belt stays clear of itself.
 
-        The model knows no contact, so an equilibrium may do what a belt cannot. What only touches or lies on itself
-        does not cross; what lies closer than the sagitta of an element, |κ₁| h²/8, is not told apart.
+        The model has no contact, so an equilibrium may pass through itself. A belt that only touches itself or lies on
+        itself does not cross. Crossings within the sagitta of an element, |κ₁| h²/8, are not resolved.
         """
         return self._inner.crosses_itself
 
     @property
     def links(self) -> Floats:
-        """Force of each link on the belt at its `to`, in the order of the scenario; at its `from` it is the opposite.
+        """Force of each link on the belt at its `to`, in the order of the scenario; the opposite acts at its `from`.
 
         Shapes: (m, 3).
         """
@@ -386,11 +387,13 @@ class Equilibrium:
 
     @property
     def half_turns(self) -> int | None:
-        """Signed half turns with which a closed belt ended; None of an open one."""
+        """Signed half turns with which a closed belt ended; None for an open belt."""
         return self._inner.half_turns
 
     def reaction(self, support: Place) -> Reaction:
-        """What a support does to the belt, by its index (int) or place ("start", "end", arc length as a float).
+        """Force and moment of a support on the belt.
+
+        The support is named by its index (int) or its place ("start", "end", or an arc length as a float).
 
         Errors: `NoSupport`.
         """
@@ -404,18 +407,18 @@ class Equilibrium:
         *,
         reach: float = 1.0,
     ) -> SnapMargin | None:
-        """How far a support may move before the belt is stable no longer; None where that is not within `reach`.
+        """The distance that a support may move before the belt loses its stability; None where it is above `reach`.
 
-        Along `direction`, [displacement in U, rotation left in world axes], of which the length does not matter; or
-        without one to wherever it is nearest, as far as can be told: from the nearest place along the six axes, either
-        way, on along the normal of the boundary of stability. A belt that is drawn taut before has lost nothing.
-        Stability that is lost and won again within a step of a twentieth of the reach may go unnoticed. The support is
+        `direction` is [displacement in U, left world-axes rotation], of any length. Without a direction the nearest
+        pose is sought: first along the six axes, either way, then along the normal of the boundary of stability. The
+        pose found is a local minimum of the distance. A belt that is drawn straight has no slack, but has not lost its
+        stability. A loss of stability that is regained within a twentieth of the reach may be missed. The support is
         named as for `reaction`, and must hold a position and a rotation.
 
         Shapes: direction (6,).
         Errors: `NoSupport`; `NoMargin` unless the equilibrium is stable, and where it can be followed only a part of
-        `reach` without losing its stability: along a direction always, without one if nothing else is found;
-        `InvalidArgument` for what is no direction or reach.
+        `reach` without losing its stability (without a direction only if no direction finds a loss);
+        `InvalidArgument` for an invalid direction or reach.
         """
         if not (np.ndim(reach) == 0 and 0.0 < reach <= MAX_REACH):
             raise InvalidArgument(f"reach: found {reach!r}, allowed above 0 and up to {MAX_REACH:g}, in U and rad")
@@ -427,7 +430,7 @@ class Equilibrium:
         return SnapMargin(distance, np.array(towards), is_fold, np.array(position), np.array(rotation))
 
     def sensitivity(self) -> Sensitivity:
-        """The derivatives of everything by what the scenario says, as one factorised system: made once, used often.
+        """The derivatives of the equilibrium by the parameters of the scenario; factorised at the first call.
 
         Errors: `NoSensitivity` unless the equilibrium has converged to a minimum that its supports determine.
         """
@@ -438,8 +441,9 @@ class Equilibrium:
     def jacobian(self, support: Place) -> Floats:
         """Derivatives of the spine's positions by the motion of a support, which is named as for `reaction`.
 
-        The last axis is [translation, left world-axes rotation about the support point]; components that the support
-        leaves free move nothing. For other derivatives, and for single directions at less cost, see `sensitivity`.
+        The last axis is [translation, left world-axes rotation about the support point]; for components that the
+        support leaves free the derivatives are 0. `sensitivity` has other derivatives, and single directions at less
+        cost.
 
         Shapes: (n, 3, 6).
         Errors: `NoSupport`; `NoSensitivity` unless the equilibrium has converged to a minimum that its supports
@@ -479,9 +483,9 @@ class Equilibrium:
         return self._inner.mesh(_across(n_across))
 
     def outline(self, tolerance: float | None = None) -> Outline:
-        """The outline of the flat board, exact but for its arcs: no chord is farther from one than `tolerance`.
+        """The outline of the flat board, exact except on arcs: chords are within `tolerance` of their arc.
 
-        The default is a thousandth of the width. A closed belt is cut open at its start.
+        The default tolerance is a thousandth of the width. A closed belt is cut open at its start.
 
         Errors: `InvalidArgument` where the tolerance is not positive.
         """
@@ -492,7 +496,7 @@ class Equilibrium:
         return Outline(*self._inner.outline(tolerance))
 
     def flat_spine(self) -> Floats:
-        """The nodes' places in the flat board, coordinates (y, z).
+        """Places of the nodes in the flat board, coordinates (y, z).
 
         Shapes: (n, 2).
         """
@@ -506,15 +510,15 @@ class Equilibrium:
         return self._inner.flat_ribs()
 
     def flat_mesh(self, n_across: int = 9) -> tuple[Floats, NDArray[np.int64]]:
-        """Vertices (y, z) and triangles of the flat board, which `mesh` has bent: triangle by triangle the same.
+        """Vertices (y, z) and triangles of the flat board, in the order of the triangles of `mesh`.
 
-        Shapes: (p, 2) and (m, 3). A closed belt has the vertices of its seam once more, where the flat board ends.
+        Shapes: (p, 2) and (m, 3). For a closed belt the vertices of the seam come twice: at the start and at the end.
         Errors: `InvalidArgument` where n_across is below 2.
         """
         return self._inner.flat_mesh(_across(n_across))
 
     def material_points(self, flat: npt.ArrayLike) -> Floats:
-        """Where points (y, z) of the flat board are on the bent one; NaN where they are off the board.
+        """The points (y, z) of the flat board on the bent belt; NaN for points off the board.
 
         Shapes: (m, 2) to (m, 3).
         Errors: `InvalidArgument` for another shape.
@@ -522,7 +526,7 @@ class Equilibrium:
         return self._inner.material_points(_flat_points(flat))
 
     def rib_feet(self, flat: npt.ArrayLike) -> Floats:
-        """Arc length u of the ribs through points (y, z) of the flat board; NaN where they are off the board.
+        """Arc length u of the ribs through points (y, z) of the flat board; NaN for points off the board.
 
         Shapes: (m, 2) to (m,).
         Errors: `InvalidArgument` for another shape.
@@ -531,7 +535,7 @@ class Equilibrium:
 
     @property
     def stiffeners(self) -> list[tuple[float, float]]:
-        """From where to where along the spine the board is rigid; in pieces where supports or loads lie in between."""
+        """First and last arc length of each stiffener, in pieces where supports or loads lie in between."""
         return self._inner.stiffeners
 
     def to_dict(self) -> dict[str, Any]:
@@ -546,15 +550,15 @@ class Equilibrium:
 def solve(
     scenario: Scenario, *, start: tuple[npt.ArrayLike, npt.ArrayLike] | None = None, strict: bool = False
 ) -> Equilibrium:
-    """Finds the equilibrium of a scenario; a failure is a value too, see `Equilibrium.status`.
+    """Finds an equilibrium of a scenario; a failed solve returns an `Equilibrium` too, see `Equilibrium.status`.
 
-    The search begins at an arch on the side of the scenario's `bulge` or, where `start` is given, at that shape and
-    nowhere else: bend and rib slope at equal steps of the arc length, from the start of the belt to its end. Other
-    threads run meanwhile, and Ctrl-C ends the solve.
+    The search starts from an arch on the side of the scenario's `bulge`, or only from the shape `start`: bend and rib
+    slope at equal steps of the arc length, from the start of the belt to its end. Other threads run meanwhile, and
+    Ctrl-C ends the solve.
 
     Shapes: start (m,) and (m,), m at least 2.
-    Errors: `NotConverged`, which carries the equilibrium, where `strict` is asked for; `InvalidArgument` where
-    `scenario` is none or `start` no shape.
+    Errors: `NotConverged`, which carries the equilibrium, where `strict` is true and the solve fails;
+    `InvalidArgument` where `scenario` is no scenario or `start` no shape.
     """
     core = core_of(scenario)
     shape = None if start is None else _shape(start)
@@ -566,7 +570,7 @@ def solve(
 
 
 def _shape(start: tuple[npt.ArrayLike, npt.ArrayLike]) -> tuple[list[float], list[float]]:
-    """Bend and rib slope of a start, checked."""
+    """The bend and rib slope of a start, checked."""
     try:
         bend, slope = (np.asarray(field, dtype=np.float64) for field in start)
     except (TypeError, ValueError):
@@ -574,19 +578,20 @@ def _shape(start: tuple[npt.ArrayLike, npt.ArrayLike]) -> tuple[list[float], lis
     if bend.shape != slope.shape or bend.ndim != 1 or len(bend) < 2:  # noqa: PLR2004 - a start and an end
         raise InvalidArgument(f"start: found shapes {bend.shape} and {slope.shape}, allowed (m,) twice, m at least 2")
     if not (np.isfinite(bend).all() and np.isfinite(slope).all()):
-        raise InvalidArgument("start: found what is not finite, allowed finite numbers")
+        raise InvalidArgument("start: found values that are not finite, allowed finite numbers")
     return bend.tolist(), slope.tolist()
 
 
 def solve_many(
     scenarios: Iterable[Scenario], *, progress: Callable[[int, int], object] | None = None
 ) -> list[Equilibrium]:
-    """Finds the equilibria of many scenarios over all cores, in the order given; a failure spoils no other.
+    """Finds an equilibrium of each of many scenarios on all cores, in the order given.
 
-    `progress(solved, all)` is called now and then from the calling thread. Other threads run meanwhile, and Ctrl-C ends
-    the solves. The environment variable RAYON_NUM_THREADS limits the number of threads.
+    A failed solve does not affect the others. `progress(solved, all)` is called from the calling thread during the
+    solves. Other threads run meanwhile, and Ctrl-C ends the solves. The environment variable RAYON_NUM_THREADS limits
+    the number of threads.
 
-    Errors: `InvalidArgument` where one of `scenarios` is none; whatever `progress` raises.
+    Errors: `InvalidArgument` where one of `scenarios` is no scenario; any error that `progress` raises.
     """
     scenarios = list(scenarios)
     found = _core.solve_many([core_of(scenario) for scenario in scenarios], progress)
@@ -594,9 +599,9 @@ def solve_many(
 
 
 def core_of(scenario: Scenario) -> _core.Scenario:
-    """The core's scenario behind one.
+    """The core's scenario of a `Scenario`.
 
-    Errors: `InvalidArgument` where it is none.
+    Errors: `InvalidArgument` where `scenario` is no `Scenario`.
     """
     inner = getattr(scenario, "_inner", None)
     if not isinstance(inner, _core.Scenario):

@@ -1,6 +1,6 @@
-"""What fishbone raises.
+"""The errors of fishbone.
 
-Most are made by the core, with their data as attributes, which are None where they do not apply. All survive pickling.
+The core makes most of them, with their data as attributes, which are None where they do not apply. All can be pickled.
 """
 
 from __future__ import annotations
@@ -17,37 +17,37 @@ class FishboneError(Exception):
 
 
 class InvalidScenario(FishboneError, ValueError):  # noqa: N818 - a scenario is invalid, or it is not
-    """A scenario that says something it may not say; raised before any solve."""
+    """A scenario is invalid: a field is unknown or has an invalid value; raised before any solve."""
 
     reason: Literal["syntax", "unknown_field", "unknown_choice", "invalid"] | None = None
-    """What is wrong: the text is neither TOML nor JSON, there is no such field or word, or a value may not be this."""
+    """The kind of error: the text is neither TOML nor JSON, the field or the word is unknown, or a value is invalid."""
     field: str | None = None
-    """Path of the field at fault, such as "supports[1].position"; of a file itself, what of it is."""
+    """Path of the invalid field, such as "supports[1].position"; for a file as a whole its invalid property."""
     found: str | None = None
-    """What was found there."""
+    """The value found."""
     allowed: str | None = None
-    """What may stand there, in words."""
+    """The values allowed, in words."""
     choices: tuple[str, ...] = ()
-    """The fields or words of which one may stand there, where they are few."""
+    """The allowed fields or words, where they are few."""
     nearest: str | None = None
-    """Which of them was probably meant."""
+    """The allowed field or word closest to the one found."""
     line: int | None = None
-    """Line of the text, from 1, where that could not be read."""
+    """Line of the syntax error in the text, from 1."""
     column: int | None = None
-    """Column in that line, from 1."""
+    """Column of the syntax error, from 1."""
     file: str | None = None
-    """The file, where it was one."""
+    """The file, where the scenario came from a file."""
 
 
 class InvalidArgument(FishboneError, ValueError):  # noqa: N818
-    """An argument outside what a function takes."""
+    """An argument of a function is invalid."""
 
 
 class NoSupport(FishboneError, LookupError):  # noqa: N818
-    """There is no support where one was asked for."""
+    """There is no support at the given index or place."""
 
     support: Place | None = None
-    """The support that was asked for."""
+    """The index or place given."""
 
 
 class NoSensitivity(FishboneError):  # noqa: N818
@@ -56,16 +56,17 @@ class NoSensitivity(FishboneError):  # noqa: N818
     reason: Literal["no_multipliers", "not_converged", "marginal", "flat", "saddle", "redundant", "no_slack"] | None = (
         None
     )
-    """Why: the source's method knows no multipliers; the solve has not converged; the belt moves at no cost of energy;
-    a part of it is flat under load; the energy is no minimum; supports hold the same twice over, or leave no slack."""
+    """The reason: the source's method has no multipliers; the solve has not converged; the belt moves at no cost of
+    energy; a part of the belt is flat under load; the equilibrium is a saddle; supports and links are redundant
+    constraints; or the supports leave no slack."""
     redundant: str | None = None
-    """The supports and links that hold the same twice over."""
+    """The supports and links that are redundant constraints."""
     solve_message: str | None = None
-    """What the solve said that has not converged."""
+    """The message of the solve that has not converged."""
 
 
 class NoMargin(FishboneError):  # noqa: N818
-    """A shape has no stability to lose, or nothing that could be moved."""
+    """A shape is not stable, or its support cannot be moved."""
 
     reason: (
         Literal[
@@ -83,105 +84,107 @@ class NoMargin(FishboneError):  # noqa: N818
         ]
         | None
     ) = None
-    """Why: there is nothing to follow, as of `NoBranch`; it is not stable; the support holds no whole pose; or it could
-    be followed only a part of the way; the last five as of `NoPath`."""
+    """The reason: no equilibrium to follow, as in `NoBranch`; the equilibrium is not stable; the support does not hold
+    a whole pose; the equilibrium could be followed only a part of the way; the last five as in `NoPath`."""
     support: int | None = None
-    """Index of the support that holds no whole pose."""
+    """Index of the support that does not hold a whole pose."""
     share: float | None = None
-    """Which share of the reach it could be followed, stable until there."""
+    """Share of the reach along which the equilibrium could be followed, stable."""
     solve_message: str | None = None
-    """What the solve said that has not converged."""
+    """The message of the solve that has not converged."""
 
 
 class NoModes(FishboneError):  # noqa: N818
-    """A shape has no modes of its own: it is no equilibrium."""
+    """A shape has no modes, because it is no equilibrium."""
 
     reason: Literal["no_multipliers", "not_converged", "singular"] | None = None
-    """Why: the source's method knows no multipliers; the solve has not converged; the second variation is singular."""
+    """The reason: the source's method has no multipliers; the solve has not converged; the second variation is
+    singular."""
     solve_message: str | None = None
-    """What the solve said that has not converged."""
+    """The message of the solve that has not converged."""
 
 
 class NoTracker(FishboneError):  # noqa: N818
-    """There is no equilibrium to follow, or nothing to move it by."""
+    """There is no equilibrium to track, or its support cannot be moved."""
 
     reason: Literal["no_multipliers", "not_converged", "not_clamped", "no_support", "marginal"] | None = None
-    """Why: the source's method knows no multipliers; the solve has not converged; the support holds no whole pose, or
-    there is none; or the equilibrium is no strict minimum."""
+    """The reason: the source's method has no multipliers; the solve has not converged; the support does not hold a
+    whole pose; there is no such support; or the equilibrium is no strict minimum."""
     support: int | None = None
-    """Index of the support that holds no whole pose, or is not there."""
+    """Index of the support that does not hold a whole pose, or does not exist."""
     solve_message: str | None = None
-    """What the solve said that has not converged."""
+    """The message of the solve that has not converged."""
 
 
 class NoPath(FishboneError, ValueError):  # noqa: N818
-    """A scenario does not lead along the path that was asked for."""
+    """A scenario cannot be changed along the given path."""
 
     reason: Literal["no_number", "nothing", "not_clamped", "no_pose", "invalid", "unreadable"] | None = None
-    """Why: the scenario gives no such number; nothing changes; the support holds no whole pose, or may not be held at
-    one of the poses; the scenario at the end of the path is not valid, or a number there is not of the kind that its
-    field takes."""
+    """The reason: the scenario has no such number; the path changes nothing; the support does not hold a whole pose;
+    one of the poses is invalid; the scenario at the end of the path is invalid; or a number there has the wrong
+    type."""
     field: str | None = None
-    """Path of the field that gives no number, or that is not valid at the end."""
+    """Path of the field that has no number, or that is invalid at the end of the path."""
     found: str | None = None
-    """What was found there."""
+    """The value found."""
     allowed: str | None = None
-    """What may stand there, where it is not valid at the end."""
+    """The values allowed, where the field is invalid at the end of the path."""
     support: int | None = None
-    """Index of the support that holds no whole pose."""
+    """Index of the support that does not hold a whole pose."""
 
 
 class NoBranch(FishboneError):  # noqa: N818
-    """There is no equilibrium to follow, or it has no single continuation."""
+    """There is no equilibrium to follow, or more than one branch continues it."""
 
     reason: Literal["no_multipliers", "not_converged", "singular"] | None = None
-    """Why: the source's method knows no multipliers; the solve has not converged; or no single branch leads on."""
+    """The reason: the source's method has no multipliers; the solve has not converged; or the equilibrium is singular,
+    so that no single branch continues it."""
     solve_message: str | None = None
-    """What the solve said that has not converged."""
+    """The message of the solve that has not converged."""
 
 
 class MissingPackage(FishboneError, ImportError):  # noqa: N818
-    """An optional package is not installed; the message says how to get it."""
+    """An optional package is not installed; the message has the command that installs it."""
 
     def __init__(self, package: str, extra: str) -> None:
         super().__init__(f'{package} is not installed: pip install "fishbone[{extra}]"', name=package)
         self.package = package
         """The package that is missing."""
         self.extra = extra
-        """The extra of fishbone that brings it."""
+        """The extra of fishbone that installs the package."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.package, self.extra), self.__dict__
 
 
 class NotConverged(FishboneError):  # noqa: N818
-    """A strict solve ended without an equilibrium; what it ended with is `equilibrium`."""
+    """A strict solve has not converged; `equilibrium` is its result."""
 
     def __init__(self, equilibrium: Equilibrium, start: tuple[list[float], list[float]] | None = None) -> None:
         super().__init__(f"{equilibrium.status}: {equilibrium.message}")
         self.status: Status = equilibrium.status
         """How the solve ended."""
         self.solve_message = equilibrium.message
-        """Why, and what to try."""
+        """The reason, and what to try."""
         self.scenario = equilibrium.scenario
-        """What was to be solved."""
+        """The scenario of the solve."""
         self._start = start
         self._equilibrium: Equilibrium | None = equilibrium
 
     @property
     def equilibrium(self) -> Equilibrium:
-        """What the solve ended with; what comes from a pickle, or is a copy, solves for it again when first asked."""
+        """The result of the solve; an unpickled or copied error solves the scenario again at the first access."""
         if self._equilibrium is None:
-            from fishbone.equilibrium import solve  # noqa: PLC0415 - it raises this
+            from fishbone.equilibrium import solve  # noqa: PLC0415 - `solve` raises this error
 
             self._equilibrium = solve(self.scenario, start=self._start)
         return self._equilibrium
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # The core's shapes cannot be pickled; the same scenario leads to the same one.
+        # The core's equilibria cannot be pickled; the same scenario leads to the same equilibrium.
         return _revived, (type(self), self.args), self.__dict__ | {"_equilibrium": None}
 
 
 def _revived(kind: type[NotConverged], args: tuple[Any, ...]) -> NotConverged:
-    """One without what its constructor takes, which is set hereafter."""
+    """An error without the arguments of its constructor; unpickling sets its attributes."""
     return kind.__new__(kind, *args)

@@ -19,9 +19,9 @@ def names() -> list[str]:
 
 
 def text(name: str) -> str:
-    """The scenario file of that name.
+    """The content of a shipped scenario file.
 
-    Errors: `InvalidArgument` where there is none.
+    Errors: `InvalidArgument` where no scenario has this name.
     """
     if name not in names():
         raise InvalidArgument(f"example: found {name!r}, allowed {', '.join(names())}")
@@ -29,7 +29,7 @@ def text(name: str) -> str:
 
 
 def summary(name: str) -> str:
-    """The first sentence of the comment that a scenario file starts with."""
+    """The first sentence of the comment at the start of a scenario file."""
     comment = takewhile(lambda line: line.startswith("#"), text(name).splitlines())
     sentence, stop, _ = " ".join(line.lstrip("# ") for line in comment).partition(". ")
     return sentence + stop.rstrip()

@@ -27,14 +27,14 @@ def mesh(equilibrium: Equilibrium, n_across: int = 9) -> trimesh.Trimesh:
     Errors: `InvalidArgument` where n_across is below 2.
     """
     vertices, triangles = equilibrium.mesh(n_across)
-    # Merging vertices, trimesh's default, would close the gap of a belt whose two ends touch.
+    # By default trimesh merges vertices, which would close the gap of a belt whose two ends touch.
     return trimesh.Trimesh(vertices, triangles, process=False)
 
 
 def encode(equilibrium: Equilibrium, suffix: str, n_across: int = 9) -> bytes:
-    """A mesh file's content, by the suffix of its name.
+    """The content of a mesh file, in the format of the suffix.
 
-    Errors: `InvalidArgument` where the suffix is none of `SUFFIXES`.
+    Errors: `InvalidArgument` where the suffix is not in `SUFFIXES`.
     """
     if suffix.lower() not in SUFFIXES:
         raise InvalidArgument(f"mesh: found {suffix or 'no suffix'}, allowed {', '.join(SUFFIXES)}")

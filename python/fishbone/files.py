@@ -10,11 +10,11 @@ if TYPE_CHECKING:
 
 
 def check_writable(path: Path, suffixes: tuple[str, ...]) -> str | None:
-    """What stands in the way of writing a file here, "found …, allowed …"; None where nothing does."""
+    """The reason why a file cannot be written at a path, "found …, allowed …"; None where it can be written."""
     if path.suffix.lower() not in suffixes:
         return f"found {path.suffix or 'no suffix'}, allowed {', '.join(suffixes)}"
     try:
-        # A link stays a link: what it points to is what is replaced.
+        # A symbolic link stays a link: its target is replaced.
         target = path.resolve()
         exists = target.exists()
     except (OSError, RuntimeError) as error:
@@ -30,11 +30,11 @@ def check_writable(path: Path, suffixes: tuple[str, ...]) -> str | None:
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Writes a file beside its place and moves it there, so that no reader ever sees a part of it.
+    """Writes a draft beside the file and moves the draft to its place, so that no reader sees a part of the file.
 
     Errors: `OSError`; the file is then as it was before.
     """
-    # A link stays a link: what it points to is what is replaced.
+    # A symbolic link stays a link: its target is replaced.
     target = path.resolve()
     draft = target.with_name(f".{target.name}.{os.getpid()}.part")
     try:

@@ -1,4 +1,4 @@
-"""The equilibria along a path, stable or not: where they fold, where others branch off, and what the belt snaps to."""
+"""Continuation of equilibria along a path, stable or not, with folds, bifurcations and snaps."""
 
 from __future__ import annotations
 
@@ -43,45 +43,45 @@ class Poses(NamedTuple):
     poses: Sequence[tuple[npt.ArrayLike, npt.ArrayLike]]
     """Each a position and a rotation vector, world axes, shapes (3,)."""
     support: Place = "end"
-    """Which support, named as for `Equilibrium.reaction`; it must hold a position and a rotation."""
+    """The support that moves, named as for `Equilibrium.reaction`; it must hold a position and a rotation."""
     motion: Motion = "straight"
-    """From one pose to the next: the point on a straight line and the frame about a fixed axis, or both as a screw; by
-    the shorter turn either way."""
+    """The motion between poses. "straight": the point on a straight line and the frame about a fixed axis; "screw":
+    both as a screw. Either way by the shorter turn."""
 
 
 class Origin(NamedTuple):
-    """Where a branch comes from."""
+    """The event of another branch at which a branch begins."""
 
     branch: int
     """Index of the other branch."""
     event: int
-    """Index of the event there."""
+    """Index of the event on the other branch."""
 
 
 class Event(NamedTuple):
     """A place on a branch where the number of negative modes changes."""
 
     kind: Kind
-    """What happens there.
+    """The kind of event.
 
-    At a "fold" the branch turns back. At a "pitchfork" another branch crosses that is its own mirror image, or that
-    turns back there; at a "transcritical" one it crosses at an angle; at a "bifurcation" are others that could not be
-    followed.
+    At a "fold" the branch turns back. At a "pitchfork" the branch meets another branch that is its own mirror image, or
+    that turns back there. At a "transcritical" event it crosses another branch at an angle. At a "bifurcation" the
+    other branches could not be followed.
     """
     parameter: float
-    """Where it is, in what the diagram's `parameter_name` says."""
+    """The parameter of the event; the diagram's `parameter_name` names it."""
     state: int
-    """Index of the branch's state there, as near as that can be solved for."""
+    """Index of the state of the branch at the event, or closest to it."""
     negative_modes: tuple[int, int]
-    """Before and after, in the order of the states."""
+    """Numbers before and after the event, in the order of the states."""
     snapped: Equilibrium | None
-    """Where the belt goes that is led past the loss of its stability: the minimum downhill, if one was found."""
+    """The minimum to which the belt goes past the loss of its stability, if one was found."""
     snapped_parameter: float | None
-    """Where that is: a little past the event."""
+    """The parameter of `snapped`, a little past the event."""
 
 
 class _Report(NamedTuple):
-    """What the core reports of all states of a branch, in its order."""
+    """The quantities that the core reports of all states of a branch, in the order of the core."""
 
     parameter: Floats
     energy: Floats
@@ -95,9 +95,9 @@ class _Report(NamedTuple):
 
 
 class Branch:
-    """A curve of equilibria, its states in order; m of them, with n nodes each.
+    """A curve of equilibria: m states in order, with n nodes each.
 
-    What is reported of the states is computed when it is first asked for. Arrays are the caller's own.
+    The quantities of the states are computed at first use. Arrays are copies.
 
     Units: those of the scenario.
     """
@@ -108,21 +108,22 @@ class Branch:
         self._start = start
         origin = inner.origin(index)
         self.origin: Origin | None = None if origin is None else Origin(*origin)
-        """The event of another branch where it begins; None of the first, which begins with the path."""
+        """The event of another branch where this branch begins; None for the first branch, which begins with the
+        path."""
         self.end: End = inner.end(index)
-        """Why it ends: with the path ("range"), in another that it meets head on ("event"), where it began ("closed"),
-        where it is drawn straight ("taut"), where ribs reach edges beside a bend that held none before or leave those
-        that did ("edges"), with `states` of `follow` ("budget"), or because no step, however short, leads on
-        ("lost")."""
+        """The reason of the end of the branch: the path ends ("range"); the branch meets another branch head on
+        ("event"), or its own start ("closed"); the belt is drawn straight and has no slack left ("taut"); the set of
+        active edges beside a bend changes ("edges"); the `states` of `follow` are used up ("budget"); or no step,
+        however short, converges ("lost")."""
         self.events: list[Event] = [_event(*event) for event in inner.events(index)]
-        """Its events in order."""
+        """The events of the branch in order."""
 
     def __len__(self) -> int:
         return self._inner.states(self._index)
 
     @property
     def parameter(self) -> Floats:
-        """How far along the path, in what the diagram's `parameter_name` says.
+        """The parameter of the path; the diagram's `parameter_name` names it.
 
         Shapes: (m,).
         """
@@ -138,7 +139,7 @@ class Branch:
 
     @property
     def height(self) -> Floats:
-        """How far the highest point of the spine is along the scenario's `bulge`.
+        """The coordinate of the highest point of the spine along the scenario's `bulge`.
 
         Shapes: (m,).
         """
@@ -154,16 +155,16 @@ class Branch:
 
     @property
     def stable(self) -> list[bool | None]:
-        """Whether each is a local minimum; None where that cannot be decided, as `Equilibrium.stable`.
+        """Whether each state is a local minimum; None where not decided, as `Equilibrium.stable`.
 
-        That is next to an event, and where a good part of the belt is flat under load: there the slope of its ribs
-        costs nothing, and the second variation, which `negative_modes` counts, says nothing of them.
+        It is not decided next to an event, and where a part of the belt is flat under load: there the slope of the ribs
+        costs no energy, and `negative_modes` does not include it.
         """
         return list(self._report.stable)
 
     @property
     def least_bend_radius(self) -> Floats:
-        """The tightest bend of the whole belt; NaN where nothing bends. See `Equilibrium.least_bend_radius`.
+        """The least bend radius of the whole belt; NaN where nothing bends. See `Equilibrium.least_bend_radius`.
 
         Shapes: (m,).
         """
@@ -171,7 +172,7 @@ class Branch:
 
     @property
     def least_spine_radius(self) -> Floats:
-        """The tightest bend on the spine; NaN where nothing bends.
+        """The least bend radius on the spine; NaN where nothing bends.
 
         Shapes: (m,).
         """
@@ -179,7 +180,7 @@ class Branch:
 
     @property
     def rib_margin(self) -> Floats:
-        """How far the ribs are from crossing inside the belt.
+        """The least slack of the rib bound; ribs cross inside the belt where it is negative.
 
         Shapes: (m,).
         Source: Eq. (33).
@@ -195,7 +196,7 @@ class Branch:
         return self._positions.copy()
 
     def reaction(self, support: Place) -> Reaction:
-        """What a support does to the belt in every state, named as for `Equilibrium.reaction`.
+        """Force and moment of a support on the belt in every state; the support is named as for `Equilibrium.reaction`.
 
         Shapes: (m, 3) each.
         Errors: `NoSupport`.
@@ -204,7 +205,7 @@ class Branch:
         return Reaction(self._report.force[:, index].copy(), self._report.moment[:, index].copy())
 
     def equilibrium(self, state: int) -> Equilibrium:
-        """Everything about a state, by its index; negative ones count from the end.
+        """The equilibrium of a state, by its index; negative indices count from the end.
 
         Errors: `InvalidArgument` where there is no such state.
         """
@@ -227,29 +228,29 @@ class Branch:
 
 
 class Diagram:
-    """The branches of equilibria that hang together along a path."""
+    """The branches of equilibria that are connected along a path."""
 
     def __init__(self, inner: _core.Diagram, start: Equilibrium, parameter_name: str, support: int | None) -> None:
         self.start = start
-        """The equilibrium that was followed."""
+        """The equilibrium at the start of the path."""
         self.parameter_name = parameter_name
-        """What `parameter` is: the field where one number changes, "share of the path" where several do, 0 to 1, and of
-        poses "place on the path", 0 at the support's own and 1, 2, … at those given."""
+        """The name of `parameter`: the field where one number changes; "share of the path", 0 to 1, where several
+        change; for poses "place on the path", 0 at the first pose of the support and 1, 2, … at the poses given."""
         last = len(start._inner.reactions) - 1  # noqa: SLF001 - of this package
         self.support = support if support is not None else last if last >= 0 else None
-        """Index of the support that the path moves, or else of the last one; None where there is none."""
+        """Index of the support that the path moves, or else of the last support; None where there is no support."""
         self.branches = [Branch(inner, index, start) for index in range(inner.branches)]
-        """First the one that is followed from where the path begins, then those that branch off, in the order found."""
+        """The branch of `start`, then the branches that leave it, in the order found."""
 
     @property
     def scenario(self) -> Scenario:
-        """The scenario where the path begins."""
+        """The scenario at the start of the path."""
         return self.start.scenario
 
     def table(self) -> Columns:
-        """A report on all states of all branches, as columns: for `pandas.DataFrame(…)` or a CSV file.
+        """A table of all states of all branches, as columns: for `pandas.DataFrame(…)` or a CSV file.
 
-        They are branch, state, parameter, energy, height, stable, negative_modes, event (its kind, or empty),
+        The columns are branch, state, parameter, energy, height, stable, negative_modes, event (its kind, or empty),
         supports[0].force.x … supports[k].moment.z, least_bend_radius, least_spine_radius, rib_margin. Where nothing
         bends the radii are NaN.
 
@@ -259,7 +260,7 @@ class Diagram:
         return {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
 
     def to_dict(self) -> dict[str, Any]:
-        """The diagram as plain numbers, lists and text, schema "fishbone.diagram/1"; each state with all its result."""
+        """The diagram as plain numbers, lists and text, schema "fishbone.diagram/1", with the results of all states."""
         return {
             "schema": SCHEMA,
             "parameter_name": self.parameter_name,
@@ -282,21 +283,22 @@ def follow(  # noqa: PLR0913 - keywords all but two
     branches: int = 10,
     progress: Callable[[int, float], object] | None = None,
 ) -> Diagram:
-    """Follows an equilibrium along a path, through folds and instabilities, and all that branches off it.
+    """Follows an equilibrium along a path, through folds and instabilities, and the branches that leave it.
 
-    A scenario is solved first. The path begins with it, and is either a mapping of fields to their last values, such as
-    `{"supports[1].position[2]": 0.4}`, or `Poses`. A list stands for its numbers, by their places: of
-    `{"supports[1].position": [0, 0.7, 0.4]}` they are `supports[1].position[0]`, `[1]` and `[2]`. All numbers change
-    together, linearly, from what the scenario gives.
+    A scenario is solved first. The path is either a mapping of fields to their last values, such as
+    `{"supports[1].position[2]": 0.4}`, or `Poses`. A list stands for numbers by their index:
+    `{"supports[1].position": [0, 0.7, 0.4]}` changes `supports[1].position[0]`, `[1]` and `[2]`. All numbers change
+    together, linearly, from their values in the scenario.
 
-    `step` is the longest along a branch, which counts the path, from 0 to 1 or to the number of poses, and the motion
-    of the belt in U alike; `states` are the most of a branch, and `branches` the most in all. `progress(branch, share
-    of the path)` is called now and then from the calling thread; the share falls where a branch has turned back. Other
-    threads run meanwhile, and Ctrl-C ends it.
+    `step` is the greatest length of a step along a branch: the norm of the change of the parameter, which runs from 0
+    to 1 or to the number of poses, and of the motion of the belt in U. `states` is the greatest number of states of a
+    branch, `branches` the greatest number of branches. `progress(branch, share of the path)` is called from the calling
+    thread during the continuation; the share falls where a branch has turned back. Other threads run meanwhile, and
+    Ctrl-C ends the continuation.
 
-    Errors: `NoPath` where the scenario gives no such numbers, where nothing changes, and where the scenario at the end
-    of the path is not valid; `NoBranch` where the start has not converged or may move at no cost of energy;
-    `NoSupport`; `InvalidArgument`; whatever `progress` raises.
+    Errors: `NoPath` where the scenario has no such numbers, where nothing changes, and where the scenario at the end
+    of the path is invalid; `NoBranch` where the start has not converged or may move at no cost of energy; `NoSupport`;
+    `InvalidArgument`; any error that `progress` raises.
     """
     _check(step, states, branches)
     if not isinstance(scenario, Scenario | Equilibrium):
@@ -305,7 +307,7 @@ def follow(  # noqa: PLR0913 - keywords all but two
         start = _solved(scenario)
         way = _led(start, path)
     else:
-        # What is no path is refused before a long solve.
+        # An invalid path is refused before a long solve.
         way = _changed(scenario if isinstance(scenario, Scenario) else scenario.scenario, path)
         start = _solved(scenario)
     inner = _core.follow(start._inner, way.inner, float(step), int(states), int(branches), progress)  # noqa: SLF001
@@ -316,7 +318,7 @@ def follow(  # noqa: PLR0913 - keywords all but two
 
 
 class _Way(NamedTuple):
-    """A path as the core knows it, what its parameter is called, and the support that it moves."""
+    """A path of the core, the name of its parameter, and the support that it moves."""
 
     inner: _core.Path
     parameter_name: str
@@ -339,7 +341,7 @@ def _changed(scenario: Scenario, path: Mapping[str, Any]) -> _Way:
 
 
 def _numbers(field: str, value: Any) -> Iterator[tuple[str, float]]:  # noqa: ANN401 - whatever a caller may bring
-    """A field with its number, or each of its numbers."""
+    """A field with its number, or with each number of its list."""
     if not isinstance(field, str):
         raise InvalidArgument(f"path: found the field {field!r}, allowed a name such as supports[1].position[2]")
     value = value.tolist() if hasattr(value, "tolist") else value
@@ -367,7 +369,7 @@ def _led(start: Equilibrium, path: Poses) -> _Way:
         except (TypeError, ValueError):
             raise InvalidArgument(f"poses[{index}]: found {pose!r}, allowed a position and a rotation") from None
         poses.append((triple(f"poses[{index}][0]", position), triple(f"poses[{index}][1]", rotation)))
-    # The source's method knows no reactions, and cannot be followed wherever the support is.
+    # The source's method has no reactions, and the core refuses it whatever the support.
     support = _index_of(start, path.support) if start._inner.reactions else 0  # noqa: SLF001 - of this package
     inner = _core.Path.poses(start.scenario._inner, support, poses, path.motion)  # noqa: SLF001 - of this package
     return _Way(inner, "place on the path", support)
@@ -387,7 +389,7 @@ def _check(step: float, states: int, branches: int) -> None:
 
 
 def _is_number(number: object) -> bool:
-    """Whether it is one that a finite float can hold."""
+    """Whether the object is a number that a finite float can hold."""
     if not isinstance(number, int | float | np.integer | np.floating) or isinstance(number, bool):
         return False
     try:

@@ -1,6 +1,6 @@
 """The words of scenarios and results, as types.
 
-They are the core's: a test holds them equal to `_core.names()`.
+The core defines the words; a test compares them with `_core.names()`.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ Axis: TypeAlias = Literal["xi", "eta", "zeta"]
 Place: TypeAlias = Literal["start", "end"] | float
 """A support: by its index (int) or its place, an end of the belt or an arc length (float)."""
 Motion: TypeAlias = Literal["straight", "screw"]
-"""How a support goes from one pose to the next."""
+"""The motion of a support from one pose to the next."""
 Kind: TypeAlias = Literal["fold", "pitchfork", "transcritical", "bifurcation"]
-"""What happens at an event of a branch."""
+"""The kind of an event on a branch."""
 End: TypeAlias = Literal["range", "event", "closed", "budget", "lost", "edges", "taut"]
-"""Why a branch ends."""
+"""The reason of the end of a branch; "taut": the belt is drawn straight and has no slack left."""

@@ -67,7 +67,7 @@ if TYPE_CHECKING:
 
 SUFFIXES = (".png", ".pdf", ".svg")
 VIEWER = (0.38, 0.6, -0.7)
-"""From where the oblique view looks, in world axes, unless told otherwise; the world's x is up on the page."""
+"""Default direction to the viewer of the oblique view, in world axes; the world's x is up on the page."""
 
 _STYLE: Any = {
     "font.size": 8.0,
@@ -76,10 +76,10 @@ _STYLE: Any = {
     "xtick.major.width": 0.6,
     "ytick.major.width": 0.6,
     "savefig.dpi": 300.0,
-    # The same picture gives the same file.
+    # Equal pictures have equal files.
     "svg.hashsalt": "fishbone",
 }
-# Matplotlib's own entries of these kinds hold its version or the time of writing.
+# By default these entries hold Matplotlib's version or the time of writing.
 _METADATA: dict[str, dict[str, Any]] = {
     ".png": {"Software": None},
     ".pdf": {"CreationDate": None},
@@ -87,14 +87,14 @@ _METADATA: dict[str, dict[str, Any]] = {
 }
 _X, _Y, _Z = 0, 1, 2
 _WIDTH, _DECORATION, _GRAPHS, _KEY = 7.0, 0.6, 2.0, 0.55
-"""Page width, and heights of what surrounds the views, of the graphs and of the key [in]."""
+"""Page width, and heights of titles and labels, of the graphs and of the key [in]."""
 _PANEL = 1.4
 """Height of a panel of a diagram [in]."""
 _FLAT_HEIGHTS = (0.35, 2.4)
 SHOWN = 12
-"""Equilibria on one page, at most."""
+"""Greatest number of equilibria on one page."""
 _COLUMNS, _PANEL_TITLE = 3, 0.25
-"""Side by side, and height of a title [in]."""
+"""Number of equilibria side by side, and height of a title [in]."""
 
 # Third-angle projection: the top view stands over the front view, the view from the right stands right of it.
 _TOP = View("Top view (from +x)", UNIT[_Y], UNIT[_Z], UNIT[_X])
@@ -103,12 +103,12 @@ _SIDE = View("Side view (from +y)", UNIT[_Z], UNIT[_X], UNIT[_Y])
 
 
 def views(equilibrium: Equilibrium) -> Figure:
-    """Top, front and side view, an oblique one, the flat board with its ribs, rib angle and bend along the spine.
+    """Top, front, side and oblique view, the flat board with its ribs, rib angle and bend along the spine.
 
-    The three views have one scale. The belt is light where its ξ side faces the viewer, darker where the other does,
-    and darker still where it is rigid.
+    Top, front and side view have one scale. The belt is light where its +ξ side faces the viewer, darker where its −ξ
+    side does, and darker still where it is rigid.
 
-    Errors: `InvalidArgument` where the solve left no shape to draw.
+    Errors: `InvalidArgument` where the result of the solve has no shape.
     """
     _check(equilibrium)
     with mpl.rc_context(_STYLE):
@@ -116,9 +116,9 @@ def views(equilibrium: Equilibrium) -> Figure:
 
 
 def flat(equilibrium: Equilibrium) -> Figure:
-    """The flat board: its outline, its spine, its stiffeners, and the ribs along which it will not bend.
+    """The flat board: its outline, its spine, its stiffeners, and its ribs, along which the belt is straight.
 
-    Errors: `InvalidArgument` where the solve left no shape to draw.
+    Errors: `InvalidArgument` where the result of the solve has no shape.
     """
     _check(equilibrium)
     with mpl.rc_context(_STYLE):
@@ -131,7 +131,7 @@ def oblique(equilibrium: Equilibrium, viewer: ArrayLike = VIEWER) -> Figure:
     """The belt in parallel projection, seen from the direction `viewer`, the world's x upwards.
 
     Shapes: viewer (3,), not along x.
-    Errors: `InvalidArgument` where the solve left no shape to draw.
+    Errors: `InvalidArgument` where the result of the solve has no shape.
     """
     _check(equilibrium)
     with mpl.rc_context(_STYLE):
@@ -141,13 +141,13 @@ def oblique(equilibrium: Equilibrium, viewer: ArrayLike = VIEWER) -> Figure:
 
 
 def overview(equilibria: Sequence[Equilibrium], viewer: ArrayLike = VIEWER) -> Figure:
-    """Several equilibria of a belt side by side, with energies and stability, as `branches` gives them.
+    """Equilibria of a belt side by side, such as those of `branches`, with their energies and stability.
 
     All are in parallel projection on one scale, seen from the direction `viewer`, the world's x upwards. Of more than
-    12 the first 12 are shown.
+    12 equilibria the first 12 are drawn.
 
     Shapes: viewer (3,), not along x.
-    Errors: `InvalidArgument` where there is none, or one has no shape to draw.
+    Errors: `InvalidArgument` where there is no equilibrium, or an equilibrium has no shape.
     """
     if not equilibria:
         raise InvalidArgument("equilibria: found none, allowed one or more")
@@ -160,9 +160,10 @@ def overview(equilibria: Sequence[Equilibrium], viewer: ArrayLike = VIEWER) -> F
 def diagram(diagram: Diagram, support: Place | None = None) -> Figure:
     """Energy, height, force of a support, tightest bend and rib margin over the parameter.
 
-    Lines of stable states are solid, of unstable ones dashed, of undecided ones dotted. Markers are the events; arrows
-    lead from where stability is lost to where the belt snaps. `support` is named as for `Equilibrium.reaction`; if None
-    it is the one that the path moves, or the last. A belt without any has no force to show.
+    Lines are solid for stable states, dashed for unstable and dotted for undecided states. Markers are the events;
+    arrows lead from the loss of stability to the minimum after the snap. `support` is named as for
+    `Equilibrium.reaction`; None is the support that the path moves, or else the last support. Without supports the
+    force is left out.
 
     Errors: `NoSupport`.
     """
@@ -171,11 +172,11 @@ def diagram(diagram: Diagram, support: Place | None = None) -> Figure:
 
 
 def encode(subject: Equilibrium | Sequence[Equilibrium] | Diagram, suffix: str) -> bytes:
-    """The picture's file content, by the suffix of its name; equal for equal shapes as PNG and PDF.
+    """The content of a picture file in the format of the suffix; equal for equal shapes as PNG and PDF.
 
-    Of an equilibrium it is that of `views`, of several that of `overview`.
+    The picture is that of `views` for an equilibrium, of `overview` for several, and of `diagram` for a diagram.
 
-    Errors: `InvalidArgument` where the suffix is none of `SUFFIXES`, or there is nothing to draw.
+    Errors: `InvalidArgument` where the suffix is not in `SUFFIXES`, or there is no shape.
     """
     suffix = suffix.lower()
     if suffix not in SUFFIXES:
@@ -194,9 +195,9 @@ def _figure_of(subject: Equilibrium | Sequence[Equilibrium] | Diagram) -> Figure
 
 
 def save(subject: Equilibrium | Sequence[Equilibrium] | Diagram, path: str | os.PathLike[str]) -> None:
-    """Writes the picture to a file, .png, .pdf or .svg.
+    """Writes the picture of `encode` to a file, .png, .pdf or .svg.
 
-    Errors: `InvalidArgument` for another suffix or where there is nothing to draw, `OSError`.
+    Errors: `InvalidArgument` for another suffix or where there is no shape, `OSError`.
     """
     path = Path(path)
     write_whole(path, encode(subject, path.suffix))
@@ -268,7 +269,7 @@ def _draw_graph(axes: Axes, equilibrium: Equilibrium, values: Floats, title: str
 
 
 def _key(equilibrium: Equilibrium) -> Iterator[Line2D | Patch]:
-    """What the symbols mean, of those that the picture has."""
+    """The key of the symbols in the picture."""
     tables = equilibrium.scenario.to_dict()
     loads = tables.get("loads", {})
     kinds = {support_kind(support) for support in tables["supports"]}
@@ -324,7 +325,7 @@ def _draw_overview(equilibria: Sequence[Equilibrium], viewer: ArrayLike) -> Figu
 
 
 def stability(equilibrium: Equilibrium) -> str:
-    """What is known of an equilibrium's stability, in a few words."""
+    """The stability of an equilibrium in words."""
     if equilibrium.stable is None:
         return "stability not known"
     if equilibrium.stable:
@@ -333,7 +334,7 @@ def stability(equilibrium: Equilibrium) -> str:
 
 
 def _set_one_scale(panels: Sequence[Axes]) -> float:
-    """Gives all the same extent, each about its own middle; its height over its width."""
+    """Gives all panels the same extent, each about its own middle; returns the height over the width."""
     limits = np.array([(axes.get_xlim(), axes.get_ylim()) for axes in panels])
     half = np.ptp(limits, axis=-1).max(axis=0) / 2.0
     for axes, middle in zip(panels, limits.mean(axis=-1), strict=True):
@@ -378,13 +379,13 @@ def draw_flat(axes: Axes, equilibrium: Equilibrium) -> None:
     axes.plot(*spine[0], zorder=3, **START)
     axes.set(aspect="equal", title="Flat board", xlabel="y [length]", ylabel="z [length]")
     axes.autoscale_view()
-    # A narrow board has little room for numbers.
+    # Along the width of a narrow board there is little room for numbers.
     axes.xaxis.set_major_locator(MaxNLocator(6 if np.ptp(axes.get_xlim()) > np.ptp(axes.get_ylim()) else 4))
     axes.yaxis.set_major_locator(MaxNLocator(3 if np.ptp(axes.get_ylim()) < 0.3 * np.ptp(axes.get_xlim()) else 6))
 
 
 def _flat_height(equilibrium: Equilibrium) -> float:
-    """Height of a picture of the flat board that fills the page's width [in], within reason."""
+    """Height [in] of a picture of the flat board that fills the page's width, within `_FLAT_HEIGHTS`."""
     width, height = np.ptp(np.concatenate(equilibrium.outline().loops), axis=0)
     least, most = _FLAT_HEIGHTS
     return float(np.clip(_WIDTH * height / width, least, most))

@@ -1,4 +1,4 @@
-"""The table for people."""
+"""The tables that the command line prints."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from fishbone.names import End
 
 DIGITS = 5
-"""Significant digits: what a default mesh supports, about."""
+"""Significant digits, about the accuracy of the default mesh."""
 RIBS_MEET = 1e-3
-"""Bend radius, in widths, below which it says no more than that ribs meet there."""
+"""Bend radius, in widths, below which "ribs meet" is printed in place of the radius."""
 ENDS: dict[End, str] = {
     "closed": "ends where it began",
     "budget": "has used up its states before the end of the path",
@@ -29,22 +29,22 @@ ENDS: dict[End, str] = {
     "taut": "ends where the belt is drawn straight",
     "edges": "ends where ribs beside a bend come to other edges of the board",
 }
-"""What becomes of a branch that does not end with the path."""
+"""The printed reason of the end of a branch that does not end with the path."""
 NOUGHT = 1e-9
-"""Rib angle [degrees] that is rounding."""
+"""Largest rounding error of a rib angle [degrees]."""
 MINIMUM = {True: "yes", False: "no", None: "not known"}
 """Whether an equilibrium is a local minimum."""
 
 
 def report(equilibrium: Equilibrium) -> Group:
-    """All that the command line tells of an equilibrium, as rich tables."""
+    """The tables that the command line prints for an equilibrium."""
     tables = equilibrium.scenario.to_dict()
     title = f"{tables.get('name') or 'belt'}: {equilibrium.energy_model} energy, {equilibrium.status}"
     return Group(Text(title, style="bold"), Text(_supports(equilibrium)), _scalars(equilibrium), _vectors(equilibrium))
 
 
 def report_all(equilibria: Sequence[Equilibrium]) -> Group:
-    """All that the command line tells of the equilibria of a scenario: a row each."""
+    """The table that the command line prints for the equilibria of a scenario: a row each."""
     first = equilibria[0]
     name = first.scenario.to_dict().get("name") or "belt"
     count = "1 equilibrium" if len(equilibria) == 1 else f"{len(equilibria)} equilibria"
@@ -53,7 +53,7 @@ def report_all(equilibria: Sequence[Equilibrium]) -> Group:
 
 
 def report_diagram(diagram: Diagram) -> Group:
-    """All that the command line tells of a diagram: its branches and their events."""
+    """The tables that the command line prints for a diagram: its branches and their events."""
     name = diagram.scenario.to_dict().get("name") or "belt"
     title = Text(f"{name}: equilibria along a path, parameter: {diagram.parameter_name}", style="bold")
     ends = [
@@ -106,7 +106,7 @@ def _supports(equilibrium: Equilibrium) -> str:
 
 
 def _held(support: dict[str, Any]) -> str:
-    """What a support holds, in a word."""
+    """The constraint of a support in words."""
     if support.get("hinge") is not None:
         return f"hinged about {support['hinge']}"
     position = support.get("position")
@@ -167,14 +167,14 @@ def _named_vectors(equilibrium: Equilibrium) -> Iterable[tuple[str, Floats]]:
         force, moment = equilibrium.reaction(index)
         yield f"force on the belt, {place}", force
         yield f"moment on the belt, {place}", moment
-    # A method that knows no forces gives none.
+    # The source's method has no forces.
     for link, force in zip(tables.get("links", []), equilibrium.links, strict=False):
         ends = [_place(link[end], equilibrium.u) for end in ("from", "to")]
         yield f"force of the link from {ends[0]}, {ends[1]}", force
 
 
 def _free_ends(tables: dict[str, Any], equilibrium: Equilibrium) -> Iterator[tuple[str, Floats]]:
-    """Where the ends of an open belt have gone that nothing holds in place."""
+    """Positions of the ends of an open belt that no support holds."""
     held = {_place(support["at"], equilibrium.u) for support in tables["supports"] if support.get("position")}
     for name, node in [("start", 0), ("end", -1)]:
         if name not in held and not tables["belt"].get("closed"):
@@ -228,14 +228,14 @@ def _equilibria(equilibria: Sequence[Equilibrium]) -> Table:
 
 
 def _column(values: Sequence[float | None]) -> list[str]:
-    """Numbers with equal decimals, empty where there is none."""
+    """Numbers with equal decimals; an empty cell for None."""
     numbers = np.array([value for value in values if value is not None])
     cells = iter(row(numbers) if len(numbers) else [])
     return ["" if value is None else next(cells) for value in values]
 
 
 def _height(equilibrium: Equilibrium) -> float:
-    """How far the highest point is along the bulge."""
+    """The coordinate of the highest point along the bulge."""
     bulge = np.array(equilibrium.scenario.to_dict()["solver"]["bulge"])
     return float(equilibrium.highest_point.position @ bulge / np.linalg.norm(bulge))
 
@@ -264,7 +264,7 @@ def _branches(diagram: Diagram) -> Table:
 
 
 def _turned_back(diagram: Diagram) -> Iterator[tuple[int, str]]:
-    """The branches that begin with the path and end there too, and how far they come."""
+    """The branches that return to the start of the path, with the sentence printed for them."""
     for index, branch in enumerate(diagram.branches):
         parameter = branch.parameter
         if branch.origin is None and branch.end == "range" and parameter[-1] == parameter[0]:

@@ -1,4 +1,4 @@
-"""Scenarios: what is to be solved."""
+"""Scenarios: the input of a solve."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     Table = Mapping[str, Any]
 
 MAX_BYTES = 16_000_000
-"""A scenario file larger than this is not one: refused unread."""
+"""Largest scenario file [bytes]: a larger file is refused unread."""
 
 _PARSERS = {".toml": _core.Scenario.from_toml, ".json": _core.Scenario.from_json}
 
@@ -27,10 +27,10 @@ _PARSERS = {".toml": _core.Scenario.from_toml, ".json": _core.Scenario.from_json
 class Scenario:
     """A checked scenario: a belt, its supports, its loads.
 
-    The keywords are the tables of a scenario file; the same tables as one dict go through `from_dict`. NumPy arrays and
-    numbers are welcome anywhere a number or a list is.
+    The keywords are the tables of a scenario file; `from_dict` takes the same tables as one dict. NumPy numbers and
+    arrays may stand for numbers and lists.
 
-    Errors: `InvalidScenario`, one line "field: found …, allowed …".
+    Errors: `InvalidScenario`, one line that names the field, the value found and the values allowed.
     """
 
     __slots__ = ("_inner",)
@@ -56,7 +56,7 @@ class Scenario:
             "loads": loads,
             "solver": solver,
         }
-        # What is left out is the core's to default.
+        # The core has the defaults of the tables left out.
         self._inner = _from_dict({key: value for key, value in tables.items() if value not in (None, [])})
 
     @classmethod
@@ -108,7 +108,7 @@ def load(path: str | os.PathLike[str]) -> Scenario:
 
 def _read(path: Path) -> str:
     try:
-        # A pipe would keep us waiting for whoever may never write into it.
+        # Reading a pipe could block for ever.
         is_other = path.exists() and not path.is_file()
         content = b"" if is_other else _content(path)
     except OSError as error:
@@ -134,7 +134,7 @@ def _content(path: Path) -> bytes:
 
 
 def _invalid(field: str, found: str, allowed: str, file: Path | None = None) -> InvalidScenario:
-    """What the core says of a field, said of what never comes to it."""
+    """The error of a scenario that does not reach the core, in the form of the core's errors."""
     text = " ".join(f"{field}: found {found}, allowed {allowed}".split())
     error = InvalidScenario(text if file is None else f"{file}: {text}")
     error.reason = "invalid"
@@ -155,7 +155,7 @@ def _to_json(tables: Table) -> str:
 
 
 def _plain(value: Any, field: str) -> Any:  # noqa: ANN401 - whatever a caller may bring
-    """What JSON can hold, or a refusal that names the field, which json's own would not."""
+    """The value in types of JSON; unlike the errors of json, the error names the field."""
     if hasattr(value, "tolist"):
         return _plain(value.tolist(), field)
     if isinstance(value, Mapping):

@@ -1,4 +1,4 @@
-"""A bent belt on the page: its surface, what holds it and what loads it; needs matplotlib."""
+"""Drawing of a bent belt: its surface, its supports and its loads; needs matplotlib."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ if TYPE_CHECKING:
     Style = dict[str, Any]
 
 RIBS = 80
-"""Ribs drawn at most: more of them would print as a grey area."""
+"""Greatest number of ribs drawn: more ribs would print as a grey area."""
 AXES = "xyz"
-# Lightness alone tells things apart, so that the picture survives a monochrome printer.
+# Parts differ in lightness only, so that they can be distinguished on a monochrome print.
 LIGHT, DARK = 0.95, 0.72
 RIGID = 0.3
-"""By how much a stiffener is darker."""
+"""Lightness by which a stiffener is darker."""
 _LAMP = np.array([0.8, 0.5, 0.1]) / np.linalg.norm([0.8, 0.5, 0.1])
 RIB: Style = {"color": "0.35", "linewidth": 0.35}
 EDGE: Style = {"color": "black", "linewidth": 0.8}
@@ -45,7 +45,7 @@ _MARGIN, _THINNEST, _ARROW_SHARE, _HIDDEN_SHARE = 1.06, 0.3, 0.2, 0.02
 
 
 class View(NamedTuple):
-    """Which way to look: what goes right on the page, what up, and what points at the viewer, in world axes."""
+    """A direction of view: the world directions to the right of the page, up the page, and to the viewer."""
 
     title: str
     right: Floats
@@ -61,7 +61,7 @@ UNIT = np.eye(3)
 
 
 def draw_lit(axes: Axes, scene: Scene, viewer: ArrayLike) -> None:
-    """Draws a belt in the light of a lamp, seen from a direction with the world's x upwards, and the world's axes."""
+    """Draws a belt under a lamp, seen from a direction with the world's x upwards, and the world's axes."""
     toward = np.asarray(viewer, dtype=np.float64)
     right = np.cross(UNIT[0], toward)
     if not np.linalg.norm(right) > 0.0:
@@ -75,7 +75,7 @@ def draw_lit(axes: Axes, scene: Scene, viewer: ArrayLike) -> None:
 
 
 def _draw_triad(axes: Axes, scene: Scene, view: View) -> None:
-    """The world's axes, left below the belt."""
+    """Draws the world's axes, left below the belt."""
     points = view.page(scene.points)
     length = 0.12 * float(np.ptp(points, axis=0).max())
     tips = view.page(length * UNIT)
@@ -83,13 +83,13 @@ def _draw_triad(axes: Axes, scene: Scene, view: View) -> None:
     for name, tip in zip(AXES, tips, strict=True):
         _draw_arrow(axes, origin, tip, {"arrowstyle": "-|>", "color": "0.3", "linewidth": 0.7}, length)
         axes.annotate(name, _xy(origin + 1.35 * tip), color="0.2", ha="center", va="center", fontstyle="italic")
-    # Annotations alone do not widen the axes.
+    # Annotations do not widen the limits of the axes; invisible lines do.
     axes.plot(*(origin + 1.5 * tips).T, linestyle="")
     axes.plot(*points.T, linestyle="")
 
 
 class Arrow(NamedTuple):
-    """A force, or the direction of gravity, as it is drawn."""
+    """The arrow of a force or of gravity."""
 
     at: Floats
     reach: Floats
@@ -97,7 +97,7 @@ class Arrow(NamedTuple):
 
 
 class Strip(NamedTuple):
-    """The belt between two ribs: triangles, whether they are rigid, lines on them, and the middle for sorting."""
+    """The belt between two ribs: its triangles, its lines, and its middle, by which strips are sorted."""
 
     faces: Floats
     rigid: bool
@@ -106,7 +106,7 @@ class Strip(NamedTuple):
 
 
 class Scene:
-    """All that a view of a bent belt shows, and the box around it."""
+    """The strips and arrows of a view of a bent belt, and the box around them."""
 
     def __init__(self, equilibrium: Equilibrium) -> None:
         self.equilibrium = equilibrium
@@ -118,14 +118,14 @@ class Scene:
         self.points = np.concatenate([points, *ends])
         low, high = self.points.min(axis=0), self.points.max(axis=0)
         middle, size = (low + high) / 2.0, high - low
-        # Nowhere so thin that an axis could not be read.
+        # The box is nowhere so thin that the numbers of an axis overlap.
         size = _MARGIN * np.maximum(size, _THINNEST * size.max())
         self.low, self.high = middle - size / 2.0, middle + size / 2.0
         self.gravity = gravity_of(equilibrium.scenario.to_dict())
 
 
 def draw_scene(axes: Axes, scene: Scene, view: View, *, lit: bool = False) -> None:
-    """Draws all of a scene into axes."""
+    """Draws a scene into axes."""
     _draw_strips(axes, scene.strips, view, lit=lit)
     _draw_holds(axes, scene.equilibrium, view)
     for arrow in scene.arrows:
@@ -142,7 +142,7 @@ def _draw_strips(axes: Axes, strips: list[Strip], view: View, *, lit: bool) -> N
     fills: list[str] = []
     strokes: list[str] = []
     widths: list[float] = []
-    # The painter's algorithm: what is near hides what is far.
+    # The painter's algorithm: near strips hide far strips.
     for strip in sorted(strips, key=lambda strip: float(strip.middle @ view.toward)):
         for face in strip.faces:
             shade = str(_shade(face, view, rigid=strip.rigid, lit=lit))
@@ -170,7 +170,7 @@ def _shade(face: Floats, view: View, *, rigid: bool, lit: bool) -> float:
 
 
 def strips_of(equilibrium: Equilibrium) -> Iterator[Strip]:
-    """The belt element by element, flat corners at its ends with the outermost."""
+    """The strips of the belt, one an element; flat corners at the ends belong to the outermost elements."""
     vertices, triangles = equilibrium.mesh(2)
     feet, u = feet_of(equilibrium), equilibrium.u
     rigid = is_rigid(equilibrium, feet)
@@ -188,7 +188,7 @@ def strips_of(equilibrium: Equilibrium) -> Iterator[Strip]:
 
 
 def drawn_ribs(u: Floats) -> list[int]:
-    """Nodes whose ribs are drawn, equally spaced along the spine where there are more than enough."""
+    """Nodes whose ribs are drawn: at most `RIBS`, equally spaced along the spine."""
     wanted = np.linspace(u[0], u[-1], min(RIBS, len(u) - 1) + 1)
     nearest = np.abs(u[:, None] - wanted).argmin(axis=0)
     return sorted({0, len(u) - 1, *nearest.tolist()})
@@ -212,13 +212,13 @@ def is_rigid(equilibrium: Equilibrium, feet: Floats) -> NDArray[np.bool_]:
 
 
 def _node(equilibrium: Equilibrium, at: float | str) -> int:
-    """The node at a place; at a corner the one before it."""
+    """The node at a place; at a corner the node before it."""
     ends = {"start": 0, "end": len(equilibrium.u) - 1}
     return ends[at] if isinstance(at, str) else int(np.abs(equilibrium.u - at).argmin())
 
 
 def support_kind(support: dict[str, Any]) -> str:
-    """What is drawn for a support: that it holds a frame, a hinge's axis, or a place alone."""
+    """The symbol of a support: "frame" for a held frame, "hinge" for a held axis, "place" for a held position only."""
     if support.get("hinge") is not None:
         return "hinge"
     is_turned = any(support.get(key) is not None for key in ("rotation", "euler", "quaternion"))
@@ -244,7 +244,7 @@ def _draw_holds(axes: Axes, equilibrium: Equilibrium, view: View) -> None:
 
 
 def _forces(equilibrium: Equilibrium, length: float) -> Iterator[Arrow]:
-    """The point loads, the largest as long as told."""
+    """Arrows of the point loads; the largest is `length` long."""
     loads = equilibrium.scenario.to_dict().get("loads", {}).get("points", [])
     largest = max((float(np.linalg.norm(load["force"])) for load in loads), default=0.0)
     for load in loads:
@@ -255,13 +255,13 @@ def _forces(equilibrium: Equilibrium, length: float) -> Iterator[Arrow]:
 
 
 def gravity_of(tables: dict[str, Any]) -> Floats:
-    """The acceleration of gravity, 0 where there is none."""
+    """The acceleration of gravity, 0 if the scenario has none."""
     gravity = tables.get("loads", {}).get("gravity")
     return np.zeros(3) if gravity is None else np.array(gravity, dtype=np.float64)
 
 
 def _draw_gravity(axes: Axes, scene: Scene, view: View) -> None:
-    """An arrow in the upper right corner."""
+    """Draws the arrow of gravity in the upper right corner."""
     reach = view.page(_ARROW_SHARE * scene.size * scene.gravity / np.linalg.norm(scene.gravity))
     corners = view.page(np.stack((scene.low, scene.high)))
     room = np.abs(corners[1] - corners[0])
@@ -281,7 +281,7 @@ def _draw_gravity(axes: Axes, scene: Scene, view: View) -> None:
 
 
 def _draw_arrow(axes: Axes, at: Floats, reach: Floats, style: Style, size: float) -> None:
-    """An arrow on the page; a ring where it points out of it or into it."""
+    """Draws an arrow on the page; a ring where the arrow points out of the page or into it."""
     if np.linalg.norm(reach) < _HIDDEN_SHARE * size:
         axes.plot(*at, zorder=5, color=style["color"], marker="o", markersize=6.0, fillstyle="none", linestyle="")
         return

@@ -1,4 +1,4 @@
-"""Derivatives of an equilibrium by what it was solved for."""
+"""Derivatives of an equilibrium by the parameters of its scenario."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """How an equilibrium changes along a direction of its parameters; n is the number of nodes, m of supports.
+    """Derivative of an equilibrium along a direction of its parameters; n is the number of nodes, m of supports.
 
     Units: those of the scenario; angles in rad.
     """
@@ -53,7 +53,7 @@ class Gradient:
     natural_bend: Floats
     """By the natural bend of every segment of the belt, shape (segments,)."""
     width: float
-    """By the width; rigidity and mass of the whole width stay what they are."""
+    """By the width, at constant rigidity and mass of the whole width."""
     gravity: Floats
     """By gravity, shape (3,)."""
 
@@ -61,9 +61,9 @@ class Gradient:
 class Sensitivity:
     """The first-order conditions of an equilibrium, linearised and factorised.
 
-    A product costs little beside a solve. The derivatives are those of the discrete equations, on the mesh of the
-    equilibrium, to the accuracy of their solution; they hold as long as the ribs that touch stay the same. The
-    natural bend of segments that go on without a joint changes without one.
+    A product costs about as much as one iteration of the solve. The derivatives are those of the discrete equations, on
+    the mesh of the equilibrium, to the accuracy of the solution; they hold as long as the same ribs touch. Segments
+    that continue each other without a joint stay without a joint when their natural bend changes.
     """
 
     __slots__ = ("_inner",)
@@ -82,12 +82,13 @@ class Sensitivity:
         """The change of the equilibrium along a direction of its parameters.
 
         `supports` holds [translation, left world-axes rotation about the support point] of every support; components
-        that are free change nothing. `rigidity` is the change of R_f at the nodes, linear in between. The width changes
-        alone: for a belt given by its material go with it rigidity and mass, `rigidity = R_f/V` and `gravity = g/V`.
+        that are free change nothing. `rigidity` is the change of R_f at the nodes, linear in between. `width` changes
+        the width alone. For a belt given by its material the rigidity and the mass change with the width: add
+        `rigidity = R_f/V` and `gravity = g/V` for `width = 1`.
 
         Shapes: supports (m, 6), rigidity (n,), natural_bend (segments,), gravity (3,); None is no change.
-        Errors: `InvalidArgument` for other shapes and what is not finite; `NoSensitivity` where the supports leave the
-        belt no slack to follow.
+        Errors: `InvalidArgument` for other shapes and for numbers that are not finite; `NoSensitivity` where the
+        supports leave the belt no slack for the change.
         """
         m, n, segments = self._inner.shape
         arguments = (
@@ -108,13 +109,13 @@ class Sensitivity:
         reactions: npt.ArrayLike | None = None,
         energy: float = 0.0,
     ) -> Gradient:
-        """The derivative by the parameters of a number whose derivatives by the equilibrium are these.
+        """The gradient of a number by all parameters, from its derivatives by the equilibrium, which are the arguments.
 
-        It is the transpose of `forward`: the gradient of an objective by all parameters at the cost of one product.
+        `adjoint` is the transpose of `forward`: the gradient by all parameters costs one product.
 
         Shapes: those of `Change`; None is no dependence.
-        Errors: `InvalidArgument` for other shapes and what is not finite; `NoSensitivity` where the supports leave the
-        belt no slack to follow.
+        Errors: `InvalidArgument` for other shapes and for numbers that are not finite; `NoSensitivity` where the
+        supports leave the belt no slack for a change.
         """
         m, n, _ = self._inner.shape
         arguments = (
@@ -129,11 +130,13 @@ class Sensitivity:
         return Gradient(supports, rigidity, natural_bend, width, np.array(gravity))
 
     def jacobian(self, support: int) -> Floats:
-        """Spine positions by [translation, left world-axes rotation about the support point] of a support by its index.
+        """Derivatives of the spine positions by the motion of a support, which is named by its index.
+
+        The last axis is [translation, left world-axes rotation about the support point].
 
         Shapes: (n, 3, 6).
         Errors: `InvalidArgument` where there is no such support; `NoSensitivity` where the supports leave the belt no
-        slack to follow.
+        slack for the motion.
         """
         count, _, _ = self._inner.shape
         if not 0 <= support < count:

@@ -1,4 +1,4 @@
-"""Following an equilibrium while one of its supports moves, at the rate of a robot."""
+"""Tracking of a minimum while one of its supports moves, fast enough for the control loop of a robot."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 
 
 class Update(NamedTuple):
-    """What became of the belt as its support moved."""
+    """The result of an update of a `Tracker`."""
 
     status: Status
-    """Unless "converged", no equilibrium was found under the new pose, and the tracker stays where it was."""
+    """Unless "converged", no equilibrium was found at the new pose, and the tracker stays where it was."""
     snapped: bool
-    """Whether the equilibrium that was followed ceased to exist or to be stable on the way, and this is another one."""
+    """Whether the minimum followed ended or lost its stability on the way, so that the tracker is at another one."""
     energy: float
     """Total potential, in the unit of the scenario."""
     iterations: int
@@ -37,26 +37,26 @@ class Update(NamedTuple):
 
 
 class Tracker:
-    """A belt whose support moves: every update starts from the shape before, and keeps to its branch.
+    """A minimum of a belt whose support moves: every update starts from the shape before, and stays on its branch.
 
-    `fb.Tracker(scenario)` solves the scenario first; `support` is named as for `Equilibrium.reaction`, and must hold a
-    position and a rotation. Everything is as of the last update that converged.
+    `fb.Tracker(scenario)` solves the scenario first. `support` is named as for `Equilibrium.reaction`, and must hold a
+    position and a rotation. All properties are those after the last update that converged.
 
-    Errors: `NoTracker` where the scenario has no equilibrium to begin with; `NoSupport`.
+    Errors: `NoTracker` where the solve finds no minimum, or where the support cannot be moved; `NoSupport`.
     """
 
     def __init__(self, scenario: Scenario, support: Place = "end") -> None:
         self._start = solve(scenario)
-        # The source's method knows no reactions, and cannot be followed wherever the support is.
+        # The source's method has no reactions, and the core refuses it whatever the support.
         inner = self._start._inner  # noqa: SLF001 - of this package
         self._inner = _core.Tracker(inner, self._index_of(support) if inner.reactions else 0)
 
     def update(self, position: npt.ArrayLike, rotation: npt.ArrayLike) -> Update:
-        """Moves the support to a position and a rotation vector, world axes, and the belt with it.
+        """Moves the support to a position and a rotation vector, world axes, and follows the minimum.
 
         Shapes: (3,) each.
         Units: those of the scenario; rad.
-        Errors: `InvalidArgument` for other shapes and for what is not finite.
+        Errors: `InvalidArgument` for other shapes and for numbers that are not finite.
         """
         return Update(*self._inner.update(triple("position", position), triple("rotation", rotation)))
 
@@ -91,7 +91,7 @@ class Tracker:
         return self._inner.rib_slope
 
     def reaction(self, support: Place) -> Reaction:
-        """What a support does to the belt, named as for `Equilibrium.reaction`; it takes no solve.
+        """Force and moment of a support on the belt, without a solve; named as for `Equilibrium.reaction`.
 
         Errors: `NoSupport`.
         """
@@ -99,7 +99,7 @@ class Tracker:
         return Reaction(np.array(force), np.array(moment))
 
     def equilibrium(self) -> Equilibrium:
-        """Everything about the present shape."""
+        """The equilibrium of the current shape."""
         scenario, found = self._inner.equilibrium()
         return Equilibrium(Scenario._wrap(scenario), found)  # noqa: SLF001 - of this package
 
@@ -110,7 +110,7 @@ class Tracker:
 def triple(name: str, values: npt.ArrayLike) -> list[float]:
     """Three finite numbers, as a list.
 
-    Errors: `InvalidArgument`, which names them.
+    Errors: `InvalidArgument`, whose message begins with `name`.
     """
     try:
         vector = np.asarray(values, dtype=np.float64)
