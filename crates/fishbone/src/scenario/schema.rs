@@ -318,7 +318,7 @@ table! {
         /// Max-norm of stationarity, constraints and complementarity, with lengths in U and energy in mean R_f/U.
         #[schemars(range(min = 1e-13, max = 1e-2))]
         pub tolerance: f64,
-        /// Which of mirror twins to take: the one that bulges along this direction, world axes. Shapes: (3,).
+        /// Direction of the bulge, world axes: of two mirror images, the one that bulges along it is taken. Shapes: (3,).
         pub bulge: [f64; 3],
         /// Settings of the method `ritz`.
         pub ritz: RitzSpec,
