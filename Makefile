@@ -1,10 +1,11 @@
-# make demo    solves example 1: prints a table, writes out/example1.json and out/example1.png
-# make test    runs all checks and tests
-# make docs    builds the documents as a site: out/site/index.html
-# make wheel   builds a wheel that anyone can install, in dist; tests it in an empty environment, without cargo
-# make figures draws the pictures of README.md and docs
-# make bench   measures the times of fishbone and of its alternatives, and writes docs/performance.md
-# make clean   removes the files that these targets made
+# make demo     solves example 1: prints a table, writes out/example1.json and out/example1.png
+# make test     runs all checks and tests
+# make test-all the same, and the tests that take long
+# make docs     builds the documents as a site: out/site/index.html
+# make wheel    builds a wheel that anyone can install, in dist; tests it in an empty environment, without cargo
+# make figures  draws the pictures of README.md and docs
+# make bench    measures the times of fishbone and of its alternatives, and writes docs/performance.md
+# make clean    removes the files that these targets made
 #
 # `make bench BENCH="--only cold --dry-run"` measures a part and saves nothing.
 # Needs cargo, Python 3.10 or newer and make; everything else goes into .venv.
@@ -28,7 +29,7 @@ RUST_SOURCES := Cargo.toml Cargo.lock $(shell find crates scenarios -type f)
 PYTHON_SOURCES := pyproject.toml $(shell find python tests benchmarks docs -name '*.py' -o -name '*.pyi')
 TEXTS := $(shell find *.md LICENSE CITATION.cff docs scenarios tests -type f -not -name '*.pyc' 2>/dev/null)
 
-.PHONY: help demo test docs wheel figures bench clean
+.PHONY: help demo test test-all docs wheel figures bench clean
 .DELETE_ON_ERROR:
 
 help:
@@ -41,6 +42,9 @@ demo: $(CORE)
 
 test: $(VENV)/.rust $(VENV)/.wasm $(VENV)/.lint $(VENV)/.pytest $(SITE)/index.html
 	@echo "all tests pass"
+
+test-all: test $(VENV)/.pytest-full
+	@echo "and so do those that take long"
 
 docs: $(SITE)/index.html
 	@echo "$< written"
@@ -131,7 +135,14 @@ $(VENV)/.lint: $(CORE) $(PYTHON_SOURCES)
 	@$(BIN)/python -m mypy.stubtest --concise fishbone._core
 	@touch $@
 
+# A worker for each core, up to eight. Each starts with tests that stand together and share what is solved once.
 $(VENV)/.pytest: $(CORE) $(PYTHON_SOURCES) $(TEXTS)
 	@echo "testing the Python code"
-	@$(BIN)/python -m pytest --quiet
+	@$(BIN)/python -m pytest --quiet --numprocesses auto --maxprocesses 8 --dist worksteal
+	@touch $@
+
+# In one process: a whole search takes all cores by itself, and is made once for all tests of it.
+$(VENV)/.pytest-full: $(CORE) $(PYTHON_SOURCES) $(TEXTS)
+	@echo "testing what takes long"
+	@$(BIN)/python -m pytest --quiet -m full
 	@touch $@

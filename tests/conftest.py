@@ -1,12 +1,19 @@
-"""Fixtures: the first example, solved once."""
+"""Fixtures: the first example, solved once; the planar arch, searched with a small budget, and wholly behind a mark."""
 
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 import fishbone as fb
+from fishbone.branches import _Budget, _search
 
 ROOT = Path(__file__).parent.parent
+FEW = _Budget(sums=40, perturbed=4, continued=2)
+"""Enough for the planar arch: its lowest equilibria, a saddle, and one that passes through itself."""
 
 
 @pytest.fixture(scope="session")
@@ -44,10 +51,22 @@ def arch() -> fb.Scenario:
     return fb.load(ROOT / "scenarios" / "planar.toml")
 
 
+@pytest.fixture(
+    scope="session",
+    params=[
+        pytest.param(functools.partial(_search, budget=FEW), id="few"),
+        pytest.param(fb.branches, id="whole", marks=pytest.mark.full),
+    ],
+)
+def search(request: pytest.FixtureRequest) -> Callable[..., list[fb.Equilibrium]]:
+    """A search with a small budget, and `fb.branches`: what needs one is tested with both."""
+    return request.param
+
+
 @pytest.fixture(scope="session")
-def arches(arch: fb.Scenario) -> list[fb.Equilibrium]:
-    """All its equilibria: a search of some seconds."""
-    return fb.branches(arch)
+def arches(arch: fb.Scenario, search: Callable[..., list[fb.Equilibrium]]) -> list[fb.Equilibrium]:
+    """Its equilibria: a search of some seconds, and one of half a minute."""
+    return search(arch)
 
 
 @pytest.fixture(scope="session")
@@ -59,6 +78,6 @@ def mirrored(arch: fb.Scenario) -> fb.Scenario:
 
 
 @pytest.fixture(scope="session")
-def mirrored_arches(mirrored: fb.Scenario) -> list[fb.Equilibrium]:
-    """All its equilibria."""
-    return fb.branches(mirrored)
+def mirrored_arches(mirrored: fb.Scenario, search: Callable[..., list[fb.Equilibrium]]) -> list[fb.Equilibrium]:
+    """Its equilibria."""
+    return search(mirrored)

@@ -4,6 +4,9 @@ CONTRACT: exit 2 for invalid input (one line: file, field, what was found, what 
 converged (one line: why); exit 3 still writes `--out` and no picture. Never a traceback. In Python: `InvalidScenario`
 before any
 solve; a solve that fails is a value.
+
+The command line is called in this process, and a few times as a process of its own: once for each exit code, and
+where what is read could end or stop it. Behind the mark `full` it is a process every time.
 """
 
 from __future__ import annotations
@@ -14,6 +17,7 @@ import os
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,6 +26,7 @@ import pytest
 
 import fishbone as fb
 from changes import Change, drop, put, rename, several
+from fishbone import cli
 from helpers import Json, clamped, example1, solve_any
 
 HUGE_FILE = 100_000_000
@@ -235,14 +240,44 @@ def changed(case: Case) -> Json:
     return scenario
 
 
+def arguments(path: Path) -> list[str]:
+    return ["solve", str(path), "--out", "result.json", "--figure", "views.png"]
+
+
 def command(path: Path) -> list[str]:
-    outputs = ["--out", "result.json", "--figure", "views.png"]
-    return [sys.executable, "-m", "fishbone", "solve", str(path), *outputs]
+    return [sys.executable, "-m", "fishbone", *arguments(path)]
 
 
-def solve_file(path: Path) -> subprocess.CompletedProcess[str]:
+@dataclass(frozen=True)
+class Outcome:
+    """What the command line came to."""
+
+    code: int
+    out: str
+    err: str
+
+
+Solve = Callable[[Path], Outcome]
+
+
+def solve_as_a_process(path: Path) -> Outcome:
     """The command line on one file, in that file's folder."""
-    return subprocess.run(command(path), cwd=path.parent, capture_output=True, text=True, timeout=60, check=False)
+    done = subprocess.run(command(path), cwd=path.parent, capture_output=True, text=True, timeout=60, check=False)
+    return Outcome(done.returncode, done.stdout, done.stderr)
+
+
+@pytest.fixture(params=["called", pytest.param("process", marks=pytest.mark.full)])
+def solve_file(
+    request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> Solve:
+    """The same, in this process or in one of its own."""
+
+    def call(path: Path) -> Outcome:
+        monkeypatch.chdir(path.parent)
+        code = cli.main(arguments(path))
+        return Outcome(code, *capfd.readouterr())
+
+    return call if request.param == "called" else solve_as_a_process
 
 
 def the_line(text: str) -> str:
@@ -254,15 +289,15 @@ def the_line(text: str) -> str:
     return lines[0].lower()
 
 
-def assert_refused(path: Path, words: tuple[str, ...] = ()) -> None:
+def assert_refused(solve: Solve, path: Path, words: tuple[str, ...] = ()) -> None:
     """Exit 2, one line with the file's name and `words`, nothing written."""
     before = sorted(path.parent.iterdir())
-    process = solve_file(path)
-    line = the_line(process.stderr)
-    assert process.returncode == 2, line
+    outcome = solve(path)
+    line = the_line(outcome.err)
+    assert outcome.code == 2, line
     for word in (path.name, *words):
         assert word.lower() in line, f"{word!r} not in {line!r}"
-    assert process.stdout.strip() == ""
+    assert outcome.out.strip() == ""
     assert sorted(path.parent.iterdir()) == before
 
 
@@ -274,18 +309,26 @@ def test_good_scenario_is_accepted(tmp_path: Path) -> None:
     path = tmp_path / "good.toml"
     path.write_text(toml(good()))
     out = tmp_path / "result.json"
-    arguments = [sys.executable, "-m", "fishbone", "solve", str(path), "--out", str(out)]
-    process = subprocess.run(arguments, capture_output=True, text=True, timeout=60, check=False)
+    words = [sys.executable, "-m", "fishbone", "solve", str(path), "--out", str(out)]
+    process = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
     assert process.returncode == 0, process.stderr
     assert json.loads(out.read_text())["status"] == "converged"
 
 
 @cases
-def test_command_line_refuses_with_one_line(case: Case, tmp_path: Path) -> None:
+def test_command_line_refuses_with_one_line(case: Case, tmp_path: Path, solve_file: Solve) -> None:
     """Exit 2; the line names the file, the field and what was found."""
     path = tmp_path / "scenario.toml"
     path.write_text(toml(changed(case)))
-    assert_refused(path, case.words)
+    assert_refused(solve_file, path, case.words)
+
+
+@pytest.mark.parametrize("case", [UNKNOWN_KEYS[0], OUTSIDE[-1]], ids=lambda case: case.name)
+def test_process_refuses_with_one_line(case: Case, tmp_path: Path) -> None:
+    """What Python and the core refuse."""
+    path = tmp_path / "scenario.toml"
+    path.write_text(toml(changed(case)))
+    assert_refused(solve_as_a_process, path, case.words)
 
 
 @cases
@@ -345,33 +388,43 @@ def test_end_beyond_the_belts_length_is_infeasible(name: str) -> None:
     assert solve_any(TOO_FAR[name]).status == "infeasible"
 
 
-@too_far
-def test_command_line_says_by_how_much_the_belt_is_too_short(name: str, tmp_path: Path) -> None:
+def assert_too_short(solve: Solve, path: Path) -> None:
     """Exit 3, one line with the missing 0.25; `--out` is written and says so; no picture."""
+    outcome = solve(path)
+    line = the_line(outcome.err)
+    assert outcome.code == 3, line
+    assert "0.25" in line
+    written = json.loads((path.parent / "result.json").read_text())
+    assert written["status"] == "infeasible"
+    assert sorted(p.name for p in path.parent.iterdir()) == sorted(["result.json", path.name])
+
+
+@too_far
+def test_command_line_says_by_how_much_the_belt_is_too_short(name: str, tmp_path: Path, solve_file: Solve) -> None:
     path = tmp_path / "too_far.toml"
     path.write_text(toml(TOO_FAR[name]))
-    process = solve_file(path)
-    line = the_line(process.stderr)
-    assert process.returncode == 3, line
-    assert "0.25" in line
-    written = json.loads((tmp_path / "result.json").read_text())
-    assert written["status"] == "infeasible"
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["result.json", "too_far.toml"]
+    assert_too_short(solve_file, path)
+
+
+def test_process_says_by_how_much_the_belt_is_too_short(tmp_path: Path) -> None:
+    path = tmp_path / "too_far.toml"
+    path.write_text(toml(TOO_FAR["clamped"]))
+    assert_too_short(solve_as_a_process, path)
 
 
 # ---------------------------------------------------------------------------------------------------- files
 
 
-def test_missing_file_is_refused(tmp_path: Path) -> None:
+def test_missing_file_is_refused(tmp_path: Path, solve_file: Solve) -> None:
     """There is no such file."""
-    assert_refused(tmp_path / "missing.toml")
+    assert_refused(solve_file, tmp_path / "missing.toml")
 
 
-def test_folder_is_refused(tmp_path: Path) -> None:
+def test_folder_is_refused(tmp_path: Path, solve_file: Solve) -> None:
     """A folder is not a file."""
     folder = tmp_path / "folder.toml"
     folder.mkdir()
-    assert_refused(folder)
+    assert_refused(solve_file, folder)
 
 
 @pytest.mark.parametrize(
@@ -389,29 +442,35 @@ def test_folder_is_refused(tmp_path: Path) -> None:
         ("binary.json", bytes(range(256))),
         ("truncated.json", json.dumps(good()).encode()[:-10]),
         ("twice.toml", b'energy = "sadowsky"\nenergy = "sadowsky"\n'),
-        ("deep.json", b"[" * 100_000),
-        ("deep.toml", b"a = " + b"[" * 100_000),
     ],
 )
-def test_file_that_is_no_scenario_is_refused(name: str, content: bytes, tmp_path: Path) -> None:
-    """Nothing in it, not TOML or JSON, not text, not a table, a key twice, nested without end."""
+def test_file_that_is_no_scenario_is_refused(name: str, content: bytes, tmp_path: Path, solve_file: Solve) -> None:
+    """Nothing in it, not TOML or JSON, not text, not a table, a key twice."""
     path = tmp_path / name
     path.write_bytes(content)
-    assert_refused(path)
+    assert_refused(solve_file, path)
 
 
-def test_dangling_link_is_refused(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("name", "content"), [("deep.json", b"[" * 100_000), ("deep.toml", b"a = " + b"[" * 100_000)])
+def test_file_nested_without_end_is_refused(name: str, content: bytes, tmp_path: Path) -> None:
+    """A process of its own: one whose stack is full is ended."""
+    path = tmp_path / name
+    path.write_bytes(content)
+    assert_refused(solve_as_a_process, path)
+
+
+def test_dangling_link_is_refused(tmp_path: Path, solve_file: Solve) -> None:
     """Unreadable for anybody, root included."""
     path = tmp_path / "dangling.toml"
     path.symlink_to(tmp_path / "nowhere.toml")
-    assert_refused(path)
+    assert_refused(solve_file, path)
 
 
 def test_pipe_is_refused_without_waiting_for_it(tmp_path: Path) -> None:
-    """Reading a named pipe that nobody writes to would wait for ever."""
+    """Reading a named pipe that nobody writes to would wait for ever, so that this is a process with a time limit."""
     path = tmp_path / "pipe.toml"
     os.mkfifo(path)
-    assert_refused(path)
+    assert_refused(solve_as_a_process, path)
 
 
 def peak_memory(path: Path) -> tuple[int, subprocess.CompletedProcess[str]]:
@@ -434,8 +493,14 @@ def peak_memory(path: Path) -> tuple[int, subprocess.CompletedProcess[str]]:
     return int(process.stdout.split()[-1]) * unit, process
 
 
+@pytest.fixture(scope="module")
+def usual_memory(tmp_path_factory: pytest.TempPathFactory) -> int:
+    """What a missing file takes, in bytes."""
+    return peak_memory(tmp_path_factory.mktemp("missing") / "missing.toml")[0]
+
+
 @pytest.mark.parametrize("suffix", [".toml", ".json"])
-def test_huge_file_is_refused_without_loading_it(suffix: str, tmp_path: Path) -> None:
+def test_huge_file_is_refused_without_loading_it(suffix: str, tmp_path: Path, usual_memory: int) -> None:
     """A good scenario and 100 MB of blank lines: refused in seconds, in hardly more memory than a missing file
     takes."""
     path = tmp_path / f"huge{suffix}"
@@ -446,7 +511,6 @@ def test_huge_file_is_refused_without_loading_it(suffix: str, tmp_path: Path) ->
             file.write(b"\n" * 1_000_000)
     before = sorted(tmp_path.iterdir())
 
-    usual, _ = peak_memory(tmp_path / f"missing{suffix}")
     start = time.monotonic()
     peak, process = peak_memory(path)
     elapsed = time.monotonic() - start
@@ -455,7 +519,7 @@ def test_huge_file_is_refused_without_loading_it(suffix: str, tmp_path: Path) ->
     assert process.returncode == 2, line
     assert path.name in line
     assert elapsed < HUGE_FILE_SECONDS
-    assert peak - usual < HUGE_FILE_MEMORY
+    assert peak - usual_memory < HUGE_FILE_MEMORY
     assert sorted(tmp_path.iterdir()) == before
     path.unlink()
 
@@ -468,8 +532,8 @@ def test_huge_file_is_refused_without_loading_it(suffix: str, tmp_path: Path) ->
     [UNKNOWN_KEYS[3], WRONG_TYPES[0], MISSING[-1], BOARDS[0]],
     ids=lambda case: case.name,
 )
-def test_json_file_is_refused_like_a_toml_file(case: Case, tmp_path: Path) -> None:
+def test_json_file_is_refused_like_a_toml_file(case: Case, tmp_path: Path, solve_file: Solve) -> None:
     """CONTRACT: the same structure as JSON is accepted everywhere."""
     path = tmp_path / "scenario.json"
     path.write_text(json.dumps(changed(case)))
-    assert_refused(path, case.words)
+    assert_refused(solve_file, path, case.words)

@@ -12,10 +12,14 @@ import numpy as np
 import pytest
 
 import fishbone as fb
+from conftest import FEW
+from fishbone.branches import _search
 from helpers import Elastica, spine_at
 
 SIDES = [np.diag(signs) for signs in ([1, 1, 1], [-1, 1, 1], [1, 1, -1], [-1, 1, -1])]
 """What takes clamps in line to themselves: nothing, two mirrors and half a turn."""
+FREE = {"width": 0.1, "rigidity": 1.0, "segments": [{"kind": "straight", "length": 1.0}]}
+"""A belt that nothing holds."""
 SAME = 1e-3
 """Distance [U] within which spines are the same."""
 
@@ -120,7 +124,7 @@ def test_of_two_mirror_images_the_list_has_the_one_on_the_side_of_bulge(arches, 
             assert x.max() >= -x.min() - SAME
 
 
-def test_what_is_found_under_weight_does_not_depend_on_the_origin():
+def test_what_is_found_under_weight_does_not_depend_on_the_origin(search):
     """Wherever the potential of the weight is zero."""
 
     def found(x: float) -> list[fb.Equilibrium]:
@@ -129,7 +133,7 @@ def test_what_is_found_under_weight_does_not_depend_on_the_origin():
         clamps = [{"at": at, "position": [x, y, 0.0], "rotation": [0.0, 0.0, 0.0]} for at, y in ends]
         loads = {"gravity": [-1.0, 0.0, 0.0]}
         tables = {"belt": belt, "supports": clamps, "loads": loads, "solver": {"elements": 14}}
-        return fb.branches(fb.Scenario.from_dict(tables))
+        return search(fb.Scenario.from_dict(tables))
 
     here, there = found(0.0), found(-1.9404)
     assert [one.negative_modes for one in there] == [one.negative_modes for one in here]
@@ -137,9 +141,8 @@ def test_what_is_found_under_weight_does_not_depend_on_the_origin():
     np.testing.assert_allclose([one.elastic_energy for one in there], bending, rtol=1e-6)
 
 
-def test_a_belt_that_nothing_holds_is_flat_and_that_once():
-    belt = {"width": 0.1, "rigidity": 1.0, "segments": [{"kind": "straight", "length": 1.0}]}
-    [flat] = fb.branches(fb.Scenario.from_dict({"belt": belt}))
+def test_a_belt_that_nothing_holds_is_flat_and_that_once(search):
+    [flat] = search(fb.Scenario.from_dict({"belt": FREE}))
     assert flat.energy < 1e-12
 
 
@@ -150,6 +153,21 @@ def test_out_of_reach_is_one_infeasible_result(out_of_reach):
     [only] = fb.branches(out_of_reach)
     assert only.status == "infeasible"
     assert result(only) == result(fb.solve(out_of_reach))
+
+
+def test_the_search_is_the_whole_one_unless_a_budget_is_given():
+    """By the number of its tasks: more than 4100 starts, as `branches` says, fewer with a budget."""
+    flat = fb.Scenario.from_dict({"belt": FREE, "solver": {"elements": 4}})
+    planned = {}
+
+    def progress(name):
+        return lambda _, count: planned.update({name: max(count, planned.get(name, 0))})
+
+    [whole] = fb.branches(flat, progress=progress("whole"))
+    [part] = _search(flat, FEW, progress("few"))
+    assert whole.energy == pytest.approx(part.energy, abs=1e-12)
+    assert planned["whole"] > 4100
+    assert 0 < planned["few"] < 400
 
 
 def test_progress_never_passes_what_is_planned(arch):

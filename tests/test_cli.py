@@ -330,8 +330,9 @@ def searches(monkeypatch, arches):
     return searches
 
 
-def test_all_is_an_array_of_what_branches_finds_byte_for_byte(run, mirrored, mirrored_arches):
+def test_all_is_an_array_of_what_branches_finds_byte_for_byte(run, monkeypatch, mirrored, mirrored_arches, search):
     """A second search finds the same equilibria."""
+    monkeypatch.setattr(fb, "branches", search)
     Path("mirrored.json").write_text(json.dumps(mirrored.to_dict()), "utf-8")
     code, out, err = run("solve", "mirrored.json", "--all", "--json", "--out", "a.json")
     assert code == 0

@@ -9,6 +9,7 @@ import pytest
 
 import fishbone as fb
 from conftest import ROOT
+from fishbone import _core
 
 ORIGIN = [0.0, 0.0, 0.0]
 BELT = {"width": 0.1, "rigidity": 1.0, "segments": [{"kind": "straight", "length": 1.0}]}
@@ -173,7 +174,11 @@ CASES = {
         lambda: fb.Tracker(scenario(START, PIN)),
         {"reason": "not_clamped", "support": 1},
     ),
-    "tracker of no support": (fb.NoTracker, lambda: solved()._inner.tracker(7), {"reason": "no_support", "support": 7}),
+    "tracker of no support": (
+        fb.NoTracker,
+        lambda: _core.Tracker(solved()._inner, 7),
+        {"reason": "no_support", "support": 7},
+    ),
     "path of no number": (
         fb.NoPath,
         lambda: fb.follow(scenario(), {"energy": 1.0}),

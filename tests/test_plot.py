@@ -317,7 +317,7 @@ def test_an_overview_shows_energy_and_stability_of_each(arches):
 
 
 def test_an_overview_has_one_scale(arches):
-    figure = plot.overview(arches[:5])
+    figure = plot.overview((arches * 2)[:5])
     figure.draw_without_rendering()
     scales = [axes.bbox.width / np.ptp(axes.get_xlim()) for axes in figure.axes[:5]]
     np.testing.assert_allclose(scales, scales[0], rtol=1e-6)

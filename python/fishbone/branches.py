@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from fishbone import _core
 from fishbone.equilibrium import Equilibrium, core_of
@@ -11,6 +11,17 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from fishbone.scenario import Scenario
+
+
+class _Budget(NamedTuple):
+    """Sizes of a search smaller than the default: it takes seconds, and misses equilibria."""
+
+    sums: int
+    """Number of sums of waves among the starts."""
+    perturbed: int
+    """Greatest number of minima that are perturbed."""
+    continued: int
+    """Greatest number of equilibria that are continued in modal loads."""
 
 
 def branches(scenario: Scenario, *, progress: Callable[[int, int], object] | None = None) -> list[Equilibrium]:
@@ -29,5 +40,12 @@ def branches(scenario: Scenario, *, progress: Callable[[int, int], object] | Non
 
     Errors: `InvalidArgument` where `scenario` is no scenario; any error that `progress` raises.
     """
-    found = _core.branches(core_of(scenario), progress)
+    return _search(scenario, None, progress)
+
+
+def _search(
+    scenario: Scenario, budget: _Budget | None, progress: Callable[[int, int], object] | None = None
+) -> list[Equilibrium]:
+    """What `branches` finds with a budget: all it can without one."""
+    found = _core.branches(core_of(scenario), progress, budget)
     return [Equilibrium(scenario, inner) for inner in found]

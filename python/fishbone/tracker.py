@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from fishbone import _core
 from fishbone.equilibrium import Equilibrium, Reaction, solve
 from fishbone.errors import InvalidArgument
 from fishbone.scenario import Scenario
@@ -47,8 +48,8 @@ class Tracker:
     def __init__(self, scenario: Scenario, support: Place = "end") -> None:
         self._start = solve(scenario)
         # The source's method has no reactions, and the core refuses it whatever the support.
-        index = self._index_of(support) if self._start._inner.reactions else 0  # noqa: SLF001 - of this package
-        self._inner = self._start._inner.tracker(index)  # noqa: SLF001 - of this package
+        inner = self._start._inner  # noqa: SLF001 - of this package
+        self._inner = _core.Tracker(inner, self._index_of(support) if inner.reactions else 0)
 
     def update(self, position: npt.ArrayLike, rotation: npt.ArrayLike) -> Update:
         """Moves the support to a position and a rotation vector, world axes, and follows the minimum.

@@ -1,4 +1,4 @@
-//! From the core's vectors to NumPy arrays: float64, C order, one row a node.
+//! NumPy arrays of the core's vectors: float64, C order, one row a node.
 
 use nalgebra::{Matrix3, Matrix3x6, Vector2, Vector3};
 use numpy::ndarray::{Array2, Array3};

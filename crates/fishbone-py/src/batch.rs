@@ -1,7 +1,8 @@
 //! Many solves at once, over all cores.
 
-use crate::equilibrium::{Equilibrium, SIGNAL_INTERVAL};
+use crate::equilibrium::Equilibrium;
 use crate::scenario::Scenario;
+use crate::signals::SIGNAL_INTERVAL;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
@@ -11,7 +12,7 @@ use std::thread;
 
 /// Solves scenarios with the GIL released, in the order given; `progress(solved, all)` is called from the calling thread.
 ///
-/// Errors: whatever `progress` or a signal handler raises; the solves then end.
+/// Errors: those that `progress` or a signal handler raises; the solves then end.
 #[pyfunction]
 #[pyo3(signature = (scenarios, progress=None))]
 pub(crate) fn solve_many(
@@ -31,13 +32,13 @@ pub(crate) fn solve_many(
             let all = scenarios.len();
             let scenarios = scenarios.as_slice();
             let solves = scope.spawn(move || {
-                let told = scenarios.par_iter().map_with(sender, |sender, scenario| {
+                let outcomes = scenarios.par_iter().map_with(sender, |sender, scenario| {
                     let found = solve(scenario);
-                    // Nobody listens any more once an error has ended the wait.
+                    // The receiver is gone once an error has ended the wait.
                     let _ = sender.send(());
                     found
                 });
-                told.collect()
+                outcomes.collect()
             });
             let waited = wait(&solved, all, progress.as_ref());
             stop.store(waited.is_err(), Ordering::Relaxed);
@@ -47,7 +48,7 @@ pub(crate) fn solve_many(
     })
 }
 
-/// Waits until all is solved, telling Python how far it is and asking it for signals.
+/// Waits until all scenarios are solved; meanwhile reports progress to Python and checks for signals.
 fn wait(solved: &Receiver<()>, all: usize, progress: Option<&Py<PyAny>>) -> PyResult<()> {
     let mut count = 0;
     loop {

@@ -1,7 +1,8 @@
 //! `_core.branches`.
 
-use crate::equilibrium::{Equilibrium, SIGNAL_INTERVAL};
+use crate::equilibrium::Equilibrium;
 use crate::scenario::Scenario;
+use crate::signals::SIGNAL_INTERVAL;
 use fishbone::analysis::branches::{self as core, SearchSettings, Watch};
 use pyo3::prelude::*;
 use rayon::prelude::*;
@@ -9,7 +10,7 @@ use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread;
 
-/// How far the search is, and whether it is to end.
+/// Progress of the search, and whether the search is to end.
 #[derive(Default)]
 struct Counter {
     done: AtomicUsize,
@@ -26,7 +27,7 @@ impl Watch for Counter {
     }
 
     fn report(&self, done: usize, planned: usize) {
-        // In this order, so that no more is ever seen done than was planned.
+        // In this order a reader never sees more tasks done than planned.
         self.planned.fetch_max(planned, Ordering::SeqCst);
         self.done.fetch_max(done, Ordering::SeqCst);
     }
@@ -35,10 +36,10 @@ impl Watch for Counter {
 /// Finds the equilibria of a scenario over all cores with the GIL released; `progress(done, planned)` is called now and then
 /// from the calling thread.
 ///
-/// `budget` is the largest numbers of sums of waves to start from, of minima to perturb and of equilibria to continue, where
-/// these are to be fewer than usual: a search of moments, which may miss some.
+/// `budget` is the greatest numbers of sums of waves to start from, of minima to perturb and of equilibria to continue,
+/// where they are to be fewer than the defaults: a search of moments, which may miss some equilibria.
 ///
-/// Errors: whatever `progress` or a signal handler raises; the search then ends.
+/// Errors: those that `progress` or a signal handler raises; the search then ends.
 #[pyfunction]
 #[pyo3(signature = (scenario, progress=None, budget=None))]
 pub(crate) fn branches(
@@ -65,7 +66,7 @@ pub(crate) fn branches(
             let mut waited = Ok(());
             while waited.is_ok() && !search.is_finished() {
                 thread::park_timeout(SIGNAL_INTERVAL);
-                waited = tell(&counter, progress.as_ref());
+                waited = report_progress(&counter, progress.as_ref());
             }
             counter.stop.store(waited.is_err(), Ordering::Relaxed);
             let found = search.join();
@@ -80,7 +81,7 @@ pub(crate) fn branches(
     })
 }
 
-fn tell(counter: &Counter, progress: Option<&Py<PyAny>>) -> PyResult<()> {
+fn report_progress(counter: &Counter, progress: Option<&Py<PyAny>>) -> PyResult<()> {
     let [done, planned] = [&counter.done, &counter.planned].map(|n| n.load(Ordering::SeqCst));
     Python::attach(|py| {
         py.check_signals()?;

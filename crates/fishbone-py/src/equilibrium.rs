@@ -1,10 +1,10 @@
-//! `_core.Equilibrium` and the solve that makes it.
+//! `_core.Equilibrium`.
 
 use crate::array::{self, Grid, Points, Scalars, Triangles};
 use crate::errors::raised;
 use crate::scenario::Scenario;
 use crate::sensitivity::Sensitivity;
-use crate::tracker::Tracker;
+use crate::signals::Signals;
 use fishbone::analysis::margin::MarginSettings;
 use fishbone::board::curve::Curve;
 use fishbone::equilibrium;
@@ -15,115 +15,38 @@ use fishbone::strip::spine::Piece;
 use fishbone::surface::{self, Rib};
 use nalgebra::{Vector2, Vector3, Vector6};
 use numpy::IntoPyArray;
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::convert::Infallible;
 use std::ops::ControlFlow;
-use std::time::{Duration, Instant};
-
-/// Short enough for Ctrl-C to feel immediate, long enough to cost nothing.
-pub(crate) const SIGNAL_INTERVAL: Duration = Duration::from_millis(50);
-
-/// Solves a scenario with the GIL released.
-///
-/// Errors: whatever a signal handler raises, `KeyboardInterrupt` first of all.
-#[pyfunction]
-pub(crate) fn solve(py: Python<'_>, scenario: &Scenario) -> PyResult<Equilibrium> {
-    let mut signals = Signals::new();
-    let found = py.detach(|| Equilibrium::timed(&scenario.0, &mut || signals.proceed()));
-    match signals.raised {
-        Some(error) => Err(error),
-        None => Ok(found),
-    }
-}
-
-/// Solves a scenario from a shape with the GIL released: bend and rib slope at equal steps of the arc length.
-///
-/// Shapes: (m,) both.
-/// Errors: `ValueError`, one line, where these are no shape; whatever a signal handler raises, `KeyboardInterrupt` first of
-/// all.
-#[pyfunction]
-pub(crate) fn solve_from(
-    py: Python<'_>,
-    scenario: &Scenario,
-    bend: Vec<f64>,
-    rib_slope: Vec<f64>,
-) -> PyResult<Equilibrium> {
-    let mut signals = Signals::new();
-    let found = py.detach(|| {
-        Equilibrium::try_of(|| {
-            fishbone::solve::solve_from(&scenario.0, &bend, &rib_slope, &mut || signals.proceed())
-        })
-    });
-    match signals.raised {
-        Some(error) => Err(error),
-        None => found.map_err(|error| PyValueError::new_err(error.to_string())),
-    }
-}
+use std::time::Instant;
 
 impl Equilibrium {
-    /// Solves and takes the time.
+    /// Solves, with the time of the solve.
     pub(crate) fn timed(problem: &Problem, proceed: &mut dyn FnMut() -> ControlFlow<()>) -> Self {
         Self::of(|| fishbone::solve::solve(problem, proceed))
     }
 
-    /// What was found.
+    /// The equilibrium found.
     pub(crate) fn core(&self) -> &equilibrium::Equilibrium {
         &self.solved
     }
 
-    /// What is found, with the time that took.
+    /// The equilibrium of a search, with the time of the search.
     pub(crate) fn of(find: impl FnOnce() -> equilibrium::Equilibrium) -> Self {
         let Ok(found) = Self::try_of(|| Ok::<_, Infallible>(find()));
         found
     }
 
-    /// The same of what may not be found.
-    fn try_of<E>(find: impl FnOnce() -> Result<equilibrium::Equilibrium, E>) -> Result<Self, E> {
+    /// The equilibrium of a search that may fail, with the time of the search.
+    pub(crate) fn try_of<E>(
+        find: impl FnOnce() -> Result<equilibrium::Equilibrium, E>,
+    ) -> Result<Self, E> {
         let start = Instant::now();
         let solved = find()?;
         Ok(Self {
             solved,
             solve_time: start.elapsed().as_secs_f64(),
         })
-    }
-}
-
-/// Asks Python now and then whether a signal has arrived.
-pub(crate) struct Signals {
-    asked: Instant,
-    pub(crate) raised: Option<PyErr>,
-}
-
-impl Signals {
-    pub(crate) fn new() -> Self {
-        Self {
-            asked: Instant::now(),
-            raised: None,
-        }
-    }
-
-    pub(crate) fn proceed(&mut self) -> ControlFlow<()> {
-        self.proceed_with(|_| Ok(()))
-    }
-
-    /// The same, with something to be told to Python whenever it is asked.
-    pub(crate) fn proceed_with(
-        &mut self,
-        tell: impl FnOnce(Python<'_>) -> PyResult<()>,
-    ) -> ControlFlow<()> {
-        if self.raised.is_none() && self.asked.elapsed() >= SIGNAL_INTERVAL {
-            self.asked = Instant::now();
-            let asked = Python::attach(|py| {
-                py.check_signals()?;
-                tell(py)
-            });
-            self.raised = asked.err();
-        }
-        match self.raised {
-            Some(_) => ControlFlow::Break(()),
-            None => ControlFlow::Continue(()),
-        }
     }
 }
 
@@ -317,14 +240,14 @@ impl Equilibrium {
         (highest.u, array::row(&highest.position))
     }
 
-    /// (value, u, v), or None where the belt does not bend.
+    /// (value, u, v), or None of a flat belt.
     #[getter]
     fn least_bend_radius(&self) -> Option<(f64, f64, f64)> {
         let least = surface::least_bend_radius(&self.solved.spine)?;
         Some((least.value, least.u, least.v))
     }
 
-    /// (value, u), or None where the belt does not bend.
+    /// (value, u), or None of a flat belt.
     #[getter]
     fn least_spine_radius(&self) -> Option<(f64, f64)> {
         let least = surface::least_spine_radius(&self.solved.spine)?;
@@ -338,7 +261,7 @@ impl Equilibrium {
         (margin.value, margin.u)
     }
 
-    /// (u, u) of the first two places that pass through each other, or None where none do.
+    /// (u, u) of the first two places that pass through each other, or None if there are none.
     #[getter]
     fn crosses_itself(&self) -> Option<(f64, f64)> {
         surface::crosses_itself(&self.solved.spine).map(<(f64, f64)>::from)
@@ -407,7 +330,7 @@ impl Equilibrium {
         )
     }
 
-    /// The surface's points that were these points of the flat board; NaN off the board.
+    /// The surface's points of points of the flat board; NaN off the board.
     ///
     /// Shapes: (m, 2) to (m, 3).
     fn material_points<'py>(&self, py: Python<'py>, flat: Vec<[f64; 2]>) -> Points<'py> {
@@ -432,7 +355,7 @@ impl Equilibrium {
         feet.into_pyarray(py)
     }
 
-    /// From where to where along the spine each stiffened stretch goes.
+    /// (from, to), the arc lengths of the ends of every stiffened stretch.
     #[getter]
     fn stiffeners(&self) -> Vec<(f64, f64)> {
         let spine = &self.solved.spine;
@@ -443,9 +366,9 @@ impl Equilibrium {
             .collect()
     }
 
-    /// The scenario with another number of elements and the same equilibrium there; None where there is none like it.
+    /// The scenario with another number of elements and its equilibrium next to this one; None if there is none.
     ///
-    /// Errors: whatever a signal handler raises, `KeyboardInterrupt` first of all.
+    /// Errors: those that a signal handler raises, `KeyboardInterrupt` first of all.
     fn refined(&self, py: Python<'_>, elements: usize) -> PyResult<Option<(Scenario, Self)>> {
         let mut signals = Signals::new();
         let start = Instant::now();
@@ -461,9 +384,9 @@ impl Equilibrium {
     }
 
     /// (distance, direction, whether it is a fold, position, rotation vector) of the nearest loss of stability, along a
-    /// direction or wherever it is; None where there is none within reach.
+    /// given direction or along any; None if there is none within reach.
     ///
-    /// Errors: `NoMargin`; whatever a signal handler raises.
+    /// Errors: `NoMargin`; those that a signal handler raises.
     #[pyo3(signature = (support, direction, reach))]
     fn margin(
         &self,
@@ -515,14 +438,7 @@ impl Equilibrium {
         Ok(modes.into_iter().map(mode).collect())
     }
 
-    /// Follows it while a support moves.
-    ///
-    /// Errors: `NoTracker`.
-    fn tracker(&self, py: Python<'_>, support: usize) -> PyResult<Tracker> {
-        Tracker::new(py, &self.solved, support)
-    }
-
-    /// Its first-order conditions, factorised with the GIL released.
+    /// The first-order conditions of the equilibrium, factorised with the GIL released.
     ///
     /// Errors: `NoSensitivity`.
     fn sensitivity(&self, py: Python<'_>) -> PyResult<Sensitivity> {

@@ -14,7 +14,7 @@ use pyo3::type_object::PyTypeInfo;
 use pyo3::types::{PyString, PyTuple};
 use std::error::Error;
 
-/// The classes, which Python defines: there people look for them.
+/// The exception classes. Python defines them, for users to find them there.
 mod exception {
     pyo3::import_exception!(fishbone.errors, InvalidScenario);
     pyo3::import_exception!(fishbone.errors, NoBranch);
@@ -27,10 +27,10 @@ mod exception {
 
 /// An error of the core that is an exception of its own in Python.
 pub(crate) trait Refusal: Error + Named {
-    /// Its class.
+    /// Class of the exception.
     type Exception: PyTypeInfo;
 
-    /// Sets the attributes that not all of its kind have; their names are those that the class declares.
+    /// Sets the attributes that not every error of the class has; the exception class declares their names.
     fn describe(&self, exception: &Bound<'_, PyAny>) -> PyResult<()>;
 }
 
@@ -43,7 +43,7 @@ pub(crate) fn raised(py: Python<'_>, error: &impl Refusal) -> PyErr {
     }
 }
 
-/// The exception for what is wrong with a scenario, in one line, which a file's name begins where there is one.
+/// The exception for an invalid scenario, in one line, which begins with the file's name if there is one.
 pub(crate) fn invalid_scenario(
     py: Python<'_>,
     error: &ScenarioError,
@@ -205,7 +205,7 @@ impl Refusal for NoModes {
     }
 }
 
-/// The message of the solve, where it has not converged.
+/// Sets the message of a solve that has not converged.
 fn solve_message(uncertified: &Uncertified, exception: &Bound<'_, PyAny>) -> PyResult<()> {
     match uncertified {
         Uncertified::NotConverged { message } => exception.setattr("solve_message", message),

@@ -1,9 +1,10 @@
 //! `_core.Path`, `_core.follow` and `_core.Diagram`.
 
 use crate::array::{self, Grid, Points, Scalars};
-use crate::equilibrium::{Equilibrium, Signals};
+use crate::equilibrium::Equilibrium;
 use crate::errors::raised;
 use crate::scenario::Scenario;
+use crate::signals::Signals;
 use fishbone::analysis::continuation::{self as core, Settings, Summary};
 use fishbone::analysis::path::{self, Motion};
 use fishbone::names::Named;
@@ -12,7 +13,7 @@ use numpy::IntoPyArray;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-/// A way through the space of scenarios.
+/// A path through the space of scenarios.
 #[pyclass(frozen, module = "fishbone._core")]
 pub(crate) struct Path(path::Path);
 
@@ -30,7 +31,7 @@ impl Path {
 
     /// A support that moves through poses, each a position and a rotation vector, from one to the next by a motion's name.
     ///
-    /// Errors: `NoPath`; `ValueError` where no motion has that name.
+    /// Errors: `NoPath`; `ValueError` if no motion has the name.
     #[staticmethod]
     fn poses(
         py: Python<'_>,
@@ -51,9 +52,10 @@ impl Path {
     }
 }
 
-/// Follows an equilibrium along a path with the GIL released; `progress(branch, share of the path)` is called now and then.
+/// Follows an equilibrium along a path with the GIL released; `progress(branch, share of the path)` is called during the
+/// search.
 ///
-/// Errors: `NoBranch`; whatever `progress` or a signal handler raises.
+/// Errors: `NoBranch`; those that `progress` or a signal handler raises.
 #[pyfunction]
 #[pyo3(signature = (equilibrium, path, step, states, branches, progress=None))]
 pub(crate) fn follow(
@@ -69,6 +71,7 @@ pub(crate) fn follow(
         step,
         states,
         branches,
+        ..Settings::default()
     };
     let mut signals = Signals::new();
     let found = py.detach(|| {
@@ -91,7 +94,7 @@ pub(crate) fn follow(
 #[pyclass(frozen, module = "fishbone._core")]
 pub(crate) struct Diagram(core::Diagram);
 
-/// Kind, parameter, state, negative modes before and after, and what it snaps to with its parameter.
+/// Kind, parameter, state, negative modes before and after, and the minimum to which the belt snaps with its parameter.
 type Event = (
     &'static str,
     f64,
@@ -133,7 +136,7 @@ impl Diagram {
         Some((origin.branch, origin.event))
     }
 
-    /// Why a branch ends.
+    /// The reason for which a branch ends.
     fn end(&self, branch: usize) -> &'static str {
         self.0.branches[branch].end.name()
     }
@@ -166,10 +169,10 @@ impl Diagram {
         self.0.branches[branch].events.iter().map(event).collect()
     }
 
-    /// What is to be reported of all states of a branch.
+    /// The summaries of all states of a branch.
     ///
-    /// Shapes: (m,) each, forces and moments (m, supports, 3); NaN where nothing bends.
-    /// Errors: whatever a signal handler raises.
+    /// Shapes: (m,) each, forces and moments (m, supports, 3); NaN where the belt is flat.
+    /// Errors: those that a signal handler raises.
     fn report<'py>(&self, py: Python<'py>, branch: usize) -> PyResult<Report<'py>> {
         let states = 0..self.0.branches[branch].states.len();
         let mut signals = Signals::new();
@@ -214,7 +217,7 @@ impl Diagram {
         states.map(positions).collect()
     }
 
-    /// The scenario of a state and all that is to be known of its equilibrium.
+    /// The scenario and the equilibrium of a state.
     fn equilibrium(&self, py: Python<'_>, branch: usize, state: usize) -> (Scenario, Equilibrium) {
         py.detach(|| {
             let found = Equilibrium::of(|| self.0.equilibrium(branch, state));

@@ -9,6 +9,8 @@ mod follow;
 mod names;
 mod scenario;
 mod sensitivity;
+mod signals;
+mod solve;
 mod tracker;
 
 /// The compiled core of fishbone; `fishbone` itself is its public face.
@@ -19,7 +21,7 @@ mod _core {
     #[pymodule_export]
     use crate::branches::branches;
     #[pymodule_export]
-    use crate::equilibrium::{Equilibrium, solve, solve_from};
+    use crate::equilibrium::Equilibrium;
     #[pymodule_export]
     use crate::follow::{Diagram, Path, follow};
     #[pymodule_export]
@@ -29,8 +31,11 @@ mod _core {
     #[pymodule_export]
     use crate::sensitivity::Sensitivity;
     #[pymodule_export]
+    use crate::solve::{solve, solve_from};
+    #[pymodule_export]
     use crate::tracker::Tracker;
 
+    /// Version of the package, a word.
     #[pymodule_export]
     #[expect(non_upper_case_globals, reason = "the name Python expects")]
     const __version__: &str = env!("CARGO_PKG_VERSION");

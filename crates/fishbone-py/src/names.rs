@@ -14,7 +14,7 @@ use fishbone::strip::developable::EnergyModel;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
-/// The core's names: of what scenarios and results choose between, and by exceptions of the reasons they are raised for.
+/// The core's names: of the variants in scenarios and results, and, by exception, of the reasons for which it is raised.
 #[pyfunction]
 pub(crate) fn names(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     let lists = [

@@ -7,7 +7,7 @@ use fishbone::scenario::error::ScenarioError;
 use pyo3::prelude::*;
 use pyo3::types::PyString;
 
-/// A validated scenario: what is solved.
+/// A validated scenario, ready to be solved.
 #[pyclass(frozen, module = "fishbone._core")]
 pub(crate) struct Scenario(pub(crate) Problem);
 
@@ -15,14 +15,14 @@ pub(crate) struct Scenario(pub(crate) Problem);
 impl Scenario {
     /// Reads a scenario file's text.
     ///
-    /// Errors: `InvalidScenario`, one line "field: found …, allowed …" after the file's name, where it has one.
+    /// Errors: `InvalidScenario`, one line "field: found …, allowed …" after the file's name, if there is one.
     #[staticmethod]
     #[pyo3(signature = (text, file=None))]
     fn from_toml(py: Python<'_>, text: &str, file: Option<&Bound<'_, PyString>>) -> PyResult<Self> {
         checked(py, scenario::Scenario::from_toml(text), file)
     }
 
-    /// Reads the same structure as JSON.
+    /// Reads a scenario in JSON, of the same structure.
     ///
     /// Errors: those of `from_toml`.
     #[staticmethod]

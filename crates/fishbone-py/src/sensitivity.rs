@@ -12,7 +12,7 @@ use std::sync::{Mutex, PoisonError};
 
 /// The factorised first-order conditions of an equilibrium.
 ///
-/// Errors: `NoSensitivity` where the supports cannot move so.
+/// Errors: `NoSensitivity` if the supports cannot make a motion.
 #[pyclass(frozen, module = "fishbone._core")]
 pub(crate) struct Sensitivity {
     inner: Mutex<sensitivity::Sensitivity>,
@@ -28,13 +28,13 @@ impl Sensitivity {
         }
     }
 
-    /// With the GIL released.
+    /// Calls the derivatives with the GIL released.
     fn with<T: Send>(
         &self,
         py: Python<'_>,
         product: impl FnOnce(&mut sensitivity::Sensitivity) -> Result<T, NoSensitivity> + Send,
     ) -> PyResult<T> {
-        // Nothing of a product that has panicked is used by the next.
+        // A poisoned lock is taken all the same: a product uses nothing of one that has panicked.
         py.detach(|| product(&mut self.inner.lock().unwrap_or_else(PoisonError::into_inner)))
             .map_err(|error| raised(py, &error))
     }

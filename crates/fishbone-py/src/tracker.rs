@@ -1,9 +1,10 @@
 //! `_core.Tracker`.
 
 use crate::array::{self, Grid, Points, Scalars};
-use crate::equilibrium::{Equilibrium, Signals};
+use crate::equilibrium::Equilibrium;
 use crate::errors::raised;
 use crate::scenario::Scenario;
+use crate::signals::Signals;
 use fishbone::analysis::tracking as core;
 use fishbone::names::Named;
 use nalgebra::Vector3;
@@ -16,28 +17,27 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 pub(crate) struct Tracker(Mutex<core::Tracker>);
 
 impl Tracker {
-    /// Errors: `NoTracker`.
-    pub(crate) fn new(
-        py: Python<'_>,
-        equilibrium: &fishbone::equilibrium::Equilibrium,
-        support: usize,
-    ) -> PyResult<Self> {
-        core::Tracker::new(equilibrium, support)
-            .map(|tracker| Self(Mutex::new(tracker)))
-            .map_err(|error| raised(py, &error))
-    }
-
     fn lock(&self) -> MutexGuard<'_, core::Tracker> {
-        // An update that has panicked is not gone on with.
+        // A poisoned lock is taken all the same: an update that has panicked is not resumed.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 #[pymethods]
 impl Tracker {
+    /// Starts at an equilibrium.
+    ///
+    /// Errors: `NoTracker`.
+    #[new]
+    fn new(py: Python<'_>, equilibrium: &Equilibrium, support: usize) -> PyResult<Self> {
+        core::Tracker::new(equilibrium.core(), support)
+            .map(|tracker| Self(Mutex::new(tracker)))
+            .map_err(|error| raised(py, &error))
+    }
+
     /// (status, snapped, energy, iterations, largest residual).
     ///
-    /// Errors: whatever a signal handler raises, `KeyboardInterrupt` first of all.
+    /// Errors: those that a signal handler raises, `KeyboardInterrupt` first of all.
     fn update(
         &self,
         py: Python<'_>,
@@ -62,7 +62,7 @@ impl Tracker {
         }
     }
 
-    /// The present scenario and all that is to be known of its equilibrium.
+    /// The present scenario and its equilibrium.
     fn equilibrium(&self, py: Python<'_>) -> (Scenario, Equilibrium) {
         py.detach(|| {
             let found = Equilibrium::of(|| self.lock().equilibrium());

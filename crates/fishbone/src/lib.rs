@@ -1,21 +1,21 @@
 //! Equilibrium shapes of thin, inextensible belts by the fishbone model.
 //!
-//! A belt is described by its centre line (the *spine*) and the straight lines across it (the *ribs*); its
-//! shape is the least bending energy under the poses of its supports. A [`scenario`] becomes a [`problem`], this an
-//! [`equilibrium`], about which the [`analysis`] finds out more; the minimisation is that of the crate `stagewise`.
+//! A belt is described by its centre line (the *spine*) and the straight lines across it (the *ribs*); its shape is the
+//! least bending energy under the poses of its supports. A [`scenario`] becomes a [`problem`], and a problem an
+//! [`equilibrium`], from which every [`analysis`] starts; the crate `stagewise` minimises.
 //!
-//! | room | what it knows |
+//! | room | contents |
 //! |---|---|
-//! | [`names`] | the words for variants in files and other languages |
+//! | [`names`] | names of variants in files and other languages |
 //! | [`geometry`] | rotations, poses, twists |
 //! | [`strip`] | energy and motion of the strip between neighbouring ribs, Eq. (34) |
-//! | [`board`] | material, flat spine, outline, how ribs lie on the board |
+//! | [`board`] | material, flat spine, outline, feet and reach of ribs |
 //! | [`surface`] | curvatures, ribs, meshes of the deformed surface, Eq. (5)–(31) |
 //! | [`scenario`] | the input: its schema, its checks |
 //! | [`problem`] | a validated scenario with belt, units, mesh and programme |
 //! | [`equilibrium`] | the search for a minimum, and its result |
 //! | [`ritz`] | the source's own method, Eq. (37)–(43), as history |
-//! | [`solve`] | from a problem to an equilibrium, by the method asked for |
+//! | [`solve`] | the solution of a problem by its scenario's method |
 //! | [`analysis`] | modes, derivatives, tracking, continuation, margins, all equilibria |
 //! | [`io`] | scenarios as TOML and JSON, results as JSON |
 //!

@@ -1,11 +1,11 @@
-//! The words by which variants are called in files, in other languages and on the web: one literal for each.
+//! Names of variants in files, in other languages and on the web: one literal for each.
 
-/// What is one of several, each with a name.
+/// An enum whose variants have names.
 pub trait Named {
-    /// Its name in files and in other languages.
+    /// The variant's name in files and in other languages.
     fn name(&self) -> &'static str;
 
-    /// The names of all that it could be.
+    /// The names of all variants.
     fn names() -> Vec<&'static str>;
 }
 
@@ -13,7 +13,7 @@ pub trait Named {
 ///
 /// `named! { enum … { Variant = "name", … } }` makes an enum of words and lists all in `ALL`; with the feature `io`, serde
 /// and the schema read the same names. `named!(impl Enum { Variant = "name", … ..Inner, })` names an enum that is made
-/// elsewhere or has data; its variant `Inner(Inner)` is called what the other error in it is called.
+/// elsewhere or has data; its variant `Inner(Inner)` has the name of the error inside.
 macro_rules! named {
     (
         $(#[$attribute:meta])*
@@ -28,7 +28,7 @@ macro_rules! named {
         }
 
         impl $enum {
-            /// All of them, in order.
+            /// Variants in order, one of each.
             pub const ALL: &'static [Self] = &[$(Self::$variant),+];
         }
 

@@ -1,4 +1,4 @@
-//! From a problem to an equilibrium, by the method that its scenario asks for.
+//! The solution of a problem by the method of its scenario.
 
 use crate::equilibrium::{self, Equilibrium};
 use crate::problem::{Formulation, Problem};
@@ -18,8 +18,8 @@ pub fn solve(problem: &Problem, proceed: &mut dyn FnMut() -> ControlFlow<()>) ->
     }
 }
 
-/// The same from a shape in place of the guess, and from nowhere else: bend and rib slope at equal steps of the arc length
-/// from start to end. The source's method, which has no first-order conditions to start from, takes no heed of the shape.
+/// Finds an equilibrium from a given shape alone, in place of the guess: bend and rib slope at equal steps of the arc length
+/// from start to end. The source's method, which has no first-order conditions to start from, ignores the shape.
 ///
 /// Shapes: (m,) both, m at least 2.
 /// Units: `bend` in rad per unit of length of the scenario.
@@ -40,11 +40,11 @@ pub fn solve_from(
     })
 }
 
-/// Why two arrays are no shape to start from.
+/// The reason why two arrays are no shape to start from.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum NoShape {
-    /// Their lengths do not fit.
+    /// Their lengths differ or are less than 2.
     #[error(
         "start: found {bend} bends and {rib_slope} rib slopes, allowed as many of each, at least 2"
     )]

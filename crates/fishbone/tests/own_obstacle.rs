@@ -1,4 +1,4 @@
-//! An obstacle of one's own: a half-space that no node may enter, and the forces of the contact.
+//! An obstacle defined outside the crate: a half-space that no node may enter, and the forces of the contact.
 
 use fishbone::problem::Problem;
 use fishbone::problem::program::{BeltPoint, BeltProgram, NodeObstacle, Obstacle};
@@ -8,7 +8,7 @@ use stagewise::{Outcome, Program, Settings, Solution};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-/// All that lies beyond a height along a direction.
+/// The half-space beyond a height along a direction.
 #[derive(Debug)]
 struct HalfSpace {
     normal: Vector3<f64>,
@@ -82,7 +82,7 @@ fn test_arch_under_a_ceiling_touches_it_and_its_contact_forces_balance_the_react
             weight: 1.0 / 80.0,
         })
         .collect();
-    // From a lower arch, which does not reach the end's support yet.
+    // The start is a lower arch, which does not reach the end's support yet.
     let mut low = free.at.point.clone();
     low.fields.iter_mut().for_each(|fields| *fields *= 0.6);
     let found = minimum(&program, low);

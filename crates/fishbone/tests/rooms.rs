@@ -1,9 +1,9 @@
-//! The rooms of the crate stand in one line, and each uses only those before it.
+//! The rooms of the crate are ordered, and each uses only rooms before it.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The rooms from the lowest to the highest. A file may name its own room and those before it.
+/// Names of the rooms from the lowest to the highest, words. A file may name its own room and the rooms before it.
 const ROOMS: [&str; 12] = [
     "names",
     "geometry",
@@ -63,7 +63,7 @@ fn named(text: &str) -> Vec<String> {
 }
 
 #[test]
-fn test_every_room_uses_only_those_before_it() {
+fn test_every_room_uses_only_rooms_before_it() {
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     let mut wrong = Vec::new();
     let mut seen = [0; ROOMS.len()];

@@ -13,7 +13,7 @@ fn solved(text: &str) -> Equilibrium {
     solve(&problem, &mut || ControlFlow::Continue(()))
 }
 
-/// Converged to a minimum: residuals, supports and bounds, whatever the solver says of them.
+/// Asserts a converged minimum: residuals, supports and bounds, independently of the solver's own report.
 fn assert_minimum(equilibrium: &Equilibrium) {
     assert_eq!(
         equilibrium.status,
@@ -90,7 +90,7 @@ fn test_planar_and_twisted_belts_converge_to_minima() {
     assert!(twisted.spine.twist() > 1.0);
 }
 
-/// What a scenario has come to on ever finer meshes: energy, to a thousandth, and highest point in U.
+/// Converged values of a scenario on ever finer meshes: energy, to a thousandth, and highest point in U.
 struct Golden {
     text: &'static str,
     energy: f64,
@@ -146,7 +146,7 @@ fn test_moebius_band_has_the_published_energy() {
     let equilibrium = solved(include_str!("../../../scenarios/mobius.toml"));
     assert_eq!(equilibrium.status, Status::Converged);
     assert_eq!(equilibrium.stable(), Some(true));
-    // Starostin & van der Heijden: 18.63 half-widths.
+    // The published energy is 18.63 half-widths, by Starostin & van der Heijden.
     assert_near(
         equilibrium.energy * 30.0 / std::f64::consts::PI,
         18.63,
@@ -203,7 +203,7 @@ fn test_caller_ends_a_solve() {
 }
 
 #[test]
-fn test_nearly_taut_belts_are_warned_of_and_just_fitting_ones_are_solved() {
+fn test_belts_near_the_inextensible_limit_are_warned_of_and_belts_with_slack_are_solved() {
     let text = include_str!("../../../scenarios/planar.toml");
     let at = |distance: f64| {
         solved(&text.replace("[0.0, 0.6, 0.0]", &format!("[0.0, {distance}, 0.0]")))
@@ -211,7 +211,7 @@ fn test_nearly_taut_belts_are_warned_of_and_just_fitting_ones_are_solved() {
     let fits = at(0.9999);
     assert_minimum(&fits);
     assert!(fits.warnings.is_empty());
-    // Small amplitude: E = 4π² (1 − d), and the force is Euler's load.
+    // At small amplitude E = 4π² (1 − d), and the force is Euler's load.
     let load = 4.0 * std::f64::consts::PI.powi(2);
     assert_near(fits.energy, load * 1e-4, 1e-6 * load);
     assert_near(fits.reactions[1].wrench.force.y, -load, 1e-3 * load);
@@ -220,10 +220,14 @@ fn test_nearly_taut_belts_are_warned_of_and_just_fitting_ones_are_solved() {
         text.replace("[0.0, 0.6, 0.0]", "[0.0, 0.9999, 0.0]")
     ));
     assert_near(loose.reactions[1].wrench.force.y, -load, 0.1 * load);
-    let taut = at(1.0);
-    assert_eq!(taut.status, Status::Converged);
-    assert!(taut.warnings[0].contains("slack"), "{:?}", taut.warnings);
-    assert!(taut.reactions[1].wrench.force.norm() < 1e-6);
+    let without_slack = at(1.0);
+    assert_eq!(without_slack.status, Status::Converged);
+    assert!(
+        without_slack.warnings[0].contains("slack"),
+        "{:?}",
+        without_slack.warnings
+    );
+    assert!(without_slack.reactions[1].wrench.force.norm() < 1e-6);
 }
 
 #[test]
@@ -248,8 +252,8 @@ fn test_finer_mesh_shows_the_same_shape() {
 }
 
 #[test]
-fn test_caller_ends_a_solve_by_saying_so_once() {
-    // Hardly to be reached, so that the search passes through its restoration.
+fn test_caller_ends_a_solve_by_one_break() {
+    // The end is hardly within reach, so that the search passes through its restoration.
     let text = include_str!("../../../scenarios/planar.toml")
         .replace("[0.0, 0.6, 0.0]", "[0.0, 0.7, 0.7]");
     let problem = Problem::new(Scenario::from_toml(&text).unwrap()).unwrap();
@@ -274,7 +278,7 @@ fn test_caller_ends_a_solve_by_saying_so_once() {
 }
 
 #[test]
-fn test_solve_from_a_shape_ends_in_its_equilibrium_and_refuses_what_is_no_shape() {
+fn test_solve_from_a_shape_ends_in_its_equilibrium_and_refuses_invalid_shapes() {
     let scenario = Scenario::from_toml(include_str!("../../../scenarios/planar.toml")).unwrap();
     let problem = Problem::new(scenario).unwrap();
     let from = |bend: &[f64], slope: &[f64]| {

@@ -1,4 +1,4 @@
-//! Following an equilibrium from Rust: what it costs, and where it leads.
+//! Tracking from Rust: its allocations, and the equilibria to which it leads.
 
 use fishbone::analysis::tracking::{NoTracker, Tracker, Update};
 use fishbone::equilibrium::{Equilibrium, Status, Uncertified};
@@ -64,7 +64,7 @@ fn test_update_allocates_nothing_after_the_first() {
 }
 
 #[test]
-fn test_interrupted_update_leaves_the_tracker_where_it_was() {
+fn test_interrupted_update_leaves_the_tracker_at_its_last_pose() {
     let mut tracker = Tracker::new(&solved(&clamped(0.5)), 1).unwrap();
     let energy = tracker.energy();
     let far = Vector3::new(0.2, 0.3, -0.2);
@@ -77,7 +77,7 @@ fn test_interrupted_update_leaves_the_tracker_where_it_was() {
 }
 
 #[test]
-fn test_what_cannot_be_followed_is_refused() {
+fn test_equilibria_that_cannot_be_followed_are_refused() {
     let equilibrium = solved(&clamped(0.5));
     assert_eq!(
         Tracker::new(&equilibrium, 7).err(),
@@ -96,7 +96,7 @@ fn test_what_cannot_be_followed_is_refused() {
 }
 
 #[test]
-fn test_belt_is_where_its_first_support_was_moved_to() {
+fn test_belt_follows_its_first_support() {
     let mut tracker = Tracker::new(&solved(&clamped(0.5)), 0).unwrap();
     let to = Vector3::new(0.05, -0.02, 0.03);
     let moved = tracker.update(&to, &Vector3::zeros(), &mut || ControlFlow::Continue(()));
@@ -106,13 +106,13 @@ fn test_belt_is_where_its_first_support_was_moved_to() {
     for (pose, position) in equilibrium.spine.pose.iter().zip(tracker.positions()) {
         assert!((pose.position - position).norm() < 1e-12);
     }
-    // What is tracked from there on begins where the belt is.
+    // Tracking from the moved belt begins at its present pose.
     let again = Tracker::new(&equilibrium, 0).unwrap();
     assert!((again.positions().next().unwrap() - to).norm() < 1e-9);
 }
 
 #[test]
-fn test_pose_that_no_support_may_have_leaves_the_tracker_where_it_was() {
+fn test_invalid_pose_leaves_the_tracker_at_its_last_pose() {
     let mut tracker = Tracker::new(&solved(&clamped(0.5)), 1).unwrap();
     let energy = tracker.energy();
     let (at, level) = (Vector3::new(0.0, 0.5, 0.1), Vector3::zeros());

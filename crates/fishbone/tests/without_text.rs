@@ -1,4 +1,4 @@
-//! What is made of Rust's types alone: with the feature `io` and without it.
+//! Scenarios and paths made of Rust's types alone: with the feature `io` and without it.
 
 use approx::assert_relative_eq;
 use fishbone::analysis::path::{Change, NoPath, Path};
@@ -47,7 +47,7 @@ fn test_a_scenario_made_of_types_is_checked() {
     assert_eq!(refused.to_string(), text);
 }
 
-/// The distance of the ends, from that of the problem where the path begins.
+/// A change of the distance of the ends, from its value in the path's first problem.
 #[derive(Debug)]
 struct Approach {
     to: f64,

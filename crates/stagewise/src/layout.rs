@@ -1,11 +1,11 @@
-//! How large a programme is: its stages, and which node, stage or pair of nodes every constraint touches.
+//! Sizes of a programme: its stages, and the node, stage or pair of nodes of every constraint.
 
 use std::ops::Range;
 
-/// Rows of constraints that touch the same place.
+/// Rows of constraints at the same node or pair of nodes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Block<T> {
-    /// The place: a node, or a pair of nodes.
+    /// The node, or the pair of nodes.
     pub at: T,
     /// Number of rows.
     pub rows: usize,
@@ -65,7 +65,7 @@ impl Layout {
     ///
     /// # Panics
     ///
-    /// Unless there is a number for every stage, and no other inequality yet.
+    /// Unless there is a number for every stage, and the layout has no inequalities yet.
     #[must_use]
     pub fn with_stage_inequalities(mut self, rows: impl IntoIterator<Item = usize>) -> Self {
         assert!(self.row_weights.is_empty());
@@ -116,11 +116,11 @@ impl Layout {
     }
 
     /// Share of every stage in the whole.
-    pub fn stage_weights(&self) -> &[f64] {
+    pub(crate) fn stage_weights(&self) -> &[f64] {
         &self.stage_weights
     }
 
-    /// Share of every node in the whole: half of that of the stages beside it.
+    /// Share of every node in the whole: half of the shares of the stages beside the node.
     pub fn node_weights(&self) -> Vec<f64> {
         let half = |k: Option<usize>| {
             let weight = k.and_then(|k| self.stage_weights.get(k));
@@ -171,6 +171,11 @@ impl Layout {
         self.stage_rows[self.stages()]
     }
 
+    /// First row of the inequalities between pairs.
+    pub(crate) fn first_pair_row(&self) -> usize {
+        self.inequalities() - rows(&self.inequalities_between)
+    }
+
     /// Rows of the inequalities of a stage.
     pub fn stage_rows(&self, stage: usize) -> Range<usize> {
         self.stage_rows[stage]..self.stage_rows[stage + 1]
@@ -182,12 +187,12 @@ impl Layout {
     }
 
     /// Weight of every inequality in the barrier.
-    pub fn row_weights(&self) -> &[f64] {
+    pub(crate) fn row_weights(&self) -> &[f64] {
         &self.row_weights
     }
 
     /// Rows of every block of equalities, in the order of their values.
-    pub fn equality_blocks(&self) -> impl Iterator<Item = Range<usize>> {
+    pub(crate) fn equality_blocks(&self) -> impl Iterator<Item = Range<usize>> {
         let at = self.equalities_at.iter().map(|block| block.rows);
         let between = self.equalities_between.iter().map(|block| block.rows);
         ranges(at.chain(between))

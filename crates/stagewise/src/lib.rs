@@ -2,12 +2,14 @@
 //!
 //! A programme is a chain of nodes joined by stages. Every node carries a state and controls; the state is carried along the
 //! chain by what the controls add to it. Equalities tie nodes, or pairs of nodes; inequalities bound the controls of a stage,
-//! a node, or a pair of nodes. Whoever implements [`Program`] says what all of these are; every iteration then costs time
-//! linear in the length of the chain.
+//! a node, or a pair of nodes. An implementation of [`Program`] gives all of these with their
+//! derivatives. The time of an iteration is linear in the length of the chain, and at most quadratic in the number of
+//! constraints between pairs.
 //!
 //! - [`minimise`] is a primal–dual interior-point method: A. Wächter and L. T. Biegler, "On the implementation of an
 //!   interior-point filter line-search algorithm for large-scale nonlinear programming" (2006).
-//! - [`Inertia`] and [`lowest_modes`] tell whether a stationary point is a minimum; [`Response`] how it answers to changes.
+//! - [`Inertia`] and [`lowest_modes`] decide whether a stationary point is a minimum; [`Response`] is its sensitivity to
+//!   perturbations of the programme.
 //! - [`Follower`] follows a minimum while its programme changes, [`Continuation`] a curve of stationary points.
 //!
 //! Sizes are constants: `X` numbers of a state, `U` controls, `N = X + U` unknowns of a node.
@@ -15,35 +17,35 @@
 mod interior_point;
 mod layout;
 mod linear;
+mod linearisation;
 mod path;
 mod program;
 
 pub use interior_point::{Outcome, Residuals, Settings, Solution, assess, minimise};
 pub use layout::{Block, Layout};
-pub use linear::chain::{
-    ByControls, Chain, Diagonal, Factor, NodeMatrix, NodeTerm, NodeVector, Stage, StageMatrix,
-};
+pub use linear::chain::{ByControls, Chain, Diagonal, NodeMatrix, NodeVector, Stage};
 pub use linear::{
-    Direction, Inertia, Mode, Response, Singular, TooConcave, lowest_modes, moved,
+    Direction, Inertia, Mode, PairMatrix, Response, Singular, StageMatrix, lowest_modes, moved,
     redundant_equalities,
 };
+pub use linearisation::Linearisation;
 pub use path::{
     Continuation, Curve, End, Event, Events, Family, FollowSettings, Followed, Follower, Pace,
-    Station, Turn, over_modal_load, settle,
+    Station, Turn, by_differences, over_modal_load, settle,
 };
-pub use program::{Distance, Linearisation, Multipliers, Program, Scales, Stationary, Values};
+pub use program::{Distance, Multipliers, Program, Scales, Stationary, Values};
 
-/// The larger of two numbers; NaN where one of them is, so that no residual hides one.
+/// The larger of two numbers; NaN where either number is NaN, so that no NaN is lost.
 fn larger(a: f64, b: f64) -> f64 {
     if b <= a { a } else { b }
 }
 
-/// Largest absolute value; NaN where one is.
+/// Largest absolute value; NaN where a number is NaN.
 fn largest<'a>(numbers: impl Iterator<Item = &'a f64>) -> f64 {
     numbers.fold(0.0, |most, x| larger(most, x.abs()))
 }
 
-/// Largest absolute entry; NaN where one is.
+/// Largest absolute entry; NaN where an entry is NaN.
 fn largest_entry<const N: usize>(vectors: &[NodeVector<N>]) -> f64 {
     largest(vectors.iter().flatten())
 }

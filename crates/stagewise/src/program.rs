@@ -1,10 +1,11 @@
-//! What the solver asks of a programme, and what it answers with.
+//! The interface between a programme and the solver: values, derivatives, multipliers, points.
 
 use crate::layout::Layout;
-use crate::linear::chain::{Chain, Diagonal, NodeMatrix, NodeTerm, NodeVector, Stage, StageMatrix};
-use nalgebra::{SMatrix, SVector};
+use crate::linear::chain::NodeVector;
+use crate::linearisation::Linearisation;
+use nalgebra::SMatrix;
 
-/// What a programme is worth at a point.
+/// Objective and constraints of a programme at a point.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Values {
     /// Objective.
@@ -18,14 +19,14 @@ pub struct Values {
 /// Multipliers of a programme's constraints, in the order of the [`Layout`].
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Multipliers {
-    /// Of the equalities.
+    /// Multipliers of the equalities.
     pub equalities: Vec<f64>,
-    /// Of the inequalities, not negative.
+    /// Multipliers of the inequalities, not negative.
     pub inequalities: Vec<f64>,
 }
 
 impl Multipliers {
-    /// Zero for every constraint.
+    /// A multiplier of zero for every constraint.
     pub fn zero(layout: &Layout) -> Self {
         Self {
             equalities: vec![0.0; layout.equalities()],
@@ -33,14 +34,14 @@ impl Multipliers {
         }
     }
 
-    /// Takes over others of the same size, without allocating.
+    /// Copies multipliers of the same layout, without allocating.
     pub(crate) fn copy_from(&mut self, other: &Self) {
         self.equalities.copy_from_slice(&other.equalities);
         self.inequalities.copy_from_slice(&other.inequalities);
     }
 }
 
-/// Units in which the numbers of a programme are of order one. What the solver calls small or large is so in these.
+/// Units in which the numbers of a programme are of order one. The solver's tolerances are in these units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scales {
     /// Unit of the objective.
@@ -60,33 +61,9 @@ impl Default for Scales {
 
 impl Scales {
     /// Unit of the eigenvalues of the second variation: objective over squared distance.
-    pub fn eigenvalue(&self) -> f64 {
+    pub(crate) fn eigenvalue(&self) -> f64 {
         self.objective / (self.distance * self.distance)
     }
-}
-
-/// A programme to second order at a point.
-#[derive(Debug, Clone)]
-pub struct Linearisation<const X: usize, const U: usize, const N: usize> {
-    /// How states are carried along the chain, and second derivatives by states and controls at once.
-    pub chain: Chain<U, N>,
-    /// Second derivatives by controls, by states, and at single nodes.
-    pub diagonal: Diagonal<X, U, N>,
-    /// Gradient of the Lagrangian of the equalities, by the unknowns of every node.
-    pub gradient: Vec<NodeVector<N>>,
-    /// Gradients of the equalities at nodes.
-    pub equalities_at: Vec<NodeVector<N>>,
-    /// Gradients of the equalities between pairs, by either node.
-    pub equalities_between: Vec<[NodeVector<N>; 2]>,
-    /// Gradients of the inequalities of stages, by the controls at either end.
-    pub stage_slacks: Vec<[SVector<f64, U>; 2]>,
-    /// Gradients of the inequalities of nodes.
-    pub node_slacks: Vec<NodeVector<N>>,
-    /// Gradients of the inequalities between pairs, by either node.
-    pub pair_slacks: Vec<[NodeVector<N>; 2]>,
-    layout: Layout,
-    /// Places among the terms at single nodes: of every block of equalities, then of every block of inequalities.
-    terms: Vec<usize>,
 }
 
 /// A nonlinear programme on a chain of nodes, of which each carries a state (`X` numbers) and controls (`U`); `N = X + U`.
@@ -97,7 +74,7 @@ pub trait Program<const X: usize, const U: usize, const N: usize> {
     /// A point of the search space, which need not be a vector space.
     type Point: Clone;
 
-    /// Number of stages, and what every constraint touches. It stays the same while a programme is being solved.
+    /// Number of stages, and the nodes of every constraint. The layout stays the same while a programme is being solved.
     fn layout(&self) -> Layout;
 
     /// Units in which the numbers of the programme are of order one.
@@ -105,19 +82,29 @@ pub trait Program<const X: usize, const U: usize, const N: usize> {
         Scales::default()
     }
 
-    /// Carries the states of a point along the chain and evaluates it; false outside the domain. Where inequalities alone
-    /// are broken it still gives slacks and equalities.
+    /// Carries the states of a point along the chain and evaluates the programme there; false outside the domain. Slacks and
+    /// equalities are given also where inequalities alone are violated.
     fn evaluate(&self, point: &mut Self::Point, values: &mut Values) -> bool;
 
     /// Gradients of the equalities at nodes.
     fn equality_gradients(&self, point: &Self::Point, into: &mut [NodeVector<N>]);
 
-    /// Derivatives at a point that has been evaluated, of the objective plus multipliers times equalities; the second ones
-    /// with multipliers times slacks of the inequalities taken off. First derivatives of the slacks stand by themselves: the
-    /// solver adds them to the gradient.
+    /// Derivatives at a point that has been evaluated. The gradient is that of the objective plus multipliers times
+    /// equalities, by the unknowns: its entries by states beyond the first are zero. Gradients of slacks are given apart, and
+    /// the solver adds them to the gradient. Second derivatives are those of the objective plus multipliers times equalities
+    /// minus multipliers times slacks.
     ///
-    /// The gradient is by the unknowns: states beyond the first have none. Second derivatives by the states of both nodes of a
-    /// pair are left out, so that constraints of pairs that are not linear converge more slowly.
+    /// Second derivatives of constraints between pairs belong into [`Linearisation::equality_hessian_between`] and
+    /// [`Linearisation::inequality_hessian_between`]; the parts by the states of a single node may be in the [`Diagonal`]
+    /// instead. Where a part is missing, [`minimise`] converges to the same points, as their first-order conditions are
+    /// exact, but linearly; [`Inertia`], [`lowest_modes`], [`Response`] and [`Continuation`] are wrong by the missing part.
+    ///
+    /// [`Diagonal`]: crate::Diagonal
+    /// [`minimise`]: crate::minimise
+    /// [`Inertia`]: crate::Inertia
+    /// [`lowest_modes`]: crate::lowest_modes
+    /// [`Response`]: crate::Response
+    /// [`Continuation`]: crate::Continuation
     fn linearise(
         &self,
         point: &Self::Point,
@@ -125,7 +112,7 @@ pub trait Program<const X: usize, const U: usize, const N: usize> {
         into: &mut Linearisation<X, U, N>,
     );
 
-    /// Moves the unknowns of a point along a step; the states still have to be carried on.
+    /// Moves the unknowns of a point along a step; the next evaluation carries the states along.
     fn retract(
         &self,
         point: &Self::Point,
@@ -134,8 +121,8 @@ pub trait Program<const X: usize, const U: usize, const N: usize> {
         into: &mut Self::Point,
     );
 
-    /// The square of how far a change of its state moves each node, with its share in the whole: by this the eigenvalues of
-    /// the second variation are measured.
+    /// The metric of every node: the squared length of a change of its state, times the node's share in the whole.
+    /// Eigenvalues of the second variation are relative to this metric.
     fn metric(&self, point: &Self::Point) -> Vec<SMatrix<f64, X, X>>;
 }
 
@@ -182,16 +169,16 @@ impl<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> Progra
     }
 }
 
-/// A point that can be kept and compared.
+/// Points that can be copied and compared.
 pub trait Distance: Clone {
-    /// Takes over another of the same size, without allocating.
+    /// Copies a point of the same size, without allocating.
     fn copy_from(&mut self, other: &Self);
 
-    /// How far apart two are, in the unit of [`Scales::distance`].
+    /// Distance of two points, in the unit of [`Scales::distance`].
     fn distance(&self, other: &Self) -> f64;
 }
 
-/// A point where the first-order conditions hold, or are meant to, with the multipliers that they take.
+/// A stationary point, or an approximation of one, with the multipliers of its first-order conditions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stationary<P> {
     /// The point.
@@ -205,275 +192,4 @@ impl<P: Distance> Stationary<P> {
         self.point.copy_from(&other.point);
         self.multipliers.copy_from(&other.multipliers);
     }
-}
-
-impl<const X: usize, const U: usize, const N: usize> Linearisation<X, U, N> {
-    /// Room for the derivatives of a programme of a layout.
-    pub fn new(layout: Layout) -> Self {
-        const { assert!(X + U == N) }
-        let stages = layout.stages();
-        let equalities = layout.equalities_at().iter().map(|block| block.at);
-        let inequalities = layout.inequalities_at().iter().map(|block| block.at);
-        let places: Vec<usize> = equalities.chain(inequalities).collect();
-        let mut order: Vec<usize> = (0..places.len()).collect();
-        order.sort_by_key(|block| places[*block]);
-        let mut terms = vec![0; places.len()];
-        for (term, block) in order.iter().enumerate() {
-            terms[*block] = term;
-        }
-        let term = |block: &usize| NodeTerm {
-            node: places[*block],
-            hessian: NodeMatrix::zeros(),
-        };
-        let pair_rows = layout.equalities() - layout.equalities_at_nodes();
-        let rows_of_nodes = layout.inequalities_at().iter().map(|block| block.rows);
-        let rows_of_pairs = layout.inequalities_between().iter();
-        let rows_of_pairs = rows_of_pairs.map(|block| block.rows);
-        let zero = NodeVector::zeros();
-        Self {
-            chain: Chain {
-                stages: vec![Stage::zero(); stages],
-                first_free: [true; U],
-            },
-            diagonal: Diagonal {
-                controls: vec![StageMatrix::zeros(); stages],
-                states: Vec::new(),
-                nodes: order.iter().map(term).collect(),
-            },
-            gradient: vec![zero; stages + 1],
-            equalities_at: vec![zero; layout.equalities_at_nodes()],
-            equalities_between: vec![[zero; 2]; pair_rows],
-            stage_slacks: vec![[SVector::zeros(); 2]; layout.inequalities_at_stages()],
-            node_slacks: vec![zero; rows_of_nodes.sum()],
-            pair_slacks: vec![[zero; 2]; rows_of_pairs.sum()],
-            layout,
-            terms,
-        }
-    }
-
-    /// The layout that it is of.
-    pub fn layout(&self) -> &Layout {
-        &self.layout
-    }
-
-    /// Second derivative of multipliers times equalities of a block at a node, by the node's unknowns.
-    pub fn equality_hessian(&mut self, block: usize) -> &mut NodeMatrix<N> {
-        &mut self.diagonal.nodes[self.terms[block]].hessian
-    }
-
-    /// Minus the second derivative of multipliers times slacks of a block of inequalities of a node, by its unknowns.
-    pub fn inequality_hessian(&mut self, block: usize) -> &mut NodeMatrix<N> {
-        let block = self.layout.equalities_at().len() + block;
-        &mut self.diagonal.nodes[self.terms[block]].hessian
-    }
-
-    /// Place of a block among the terms at single nodes; blocks of inequalities follow those of equalities.
-    pub(crate) fn term(&self, block: usize) -> usize {
-        self.terms[block]
-    }
-
-    /// Change of every slack along a step, to first order.
-    pub(crate) fn slack_rates(&self, step: &[NodeVector<N>], into: &mut [f64]) {
-        let layout = &self.layout;
-        let (of_stages, rest) = into.split_at_mut(layout.inequalities_at_stages());
-        let mut rows = self.stage_slacks.iter().zip(of_stages);
-        for (count, ends) in layout.stage_counts().zip(step.windows(2)) {
-            for ([first, second], rate) in rows.by_ref().take(count) {
-                let ahead = along_controls::<X, U, N>(0.0, first, &ends[0]);
-                *rate = along_controls::<X, U, N>(ahead, second, &ends[1]);
-            }
-        }
-        let mut rest = rest.iter_mut();
-        let mut node_slacks = self.node_slacks.iter();
-        for block in layout.inequalities_at() {
-            for (slack, rate) in node_slacks.by_ref().zip(rest.by_ref()).take(block.rows) {
-                *rate = slack.dot(&step[block.at]);
-            }
-        }
-        let mut pair_slacks = self.pair_slacks.iter();
-        for block in layout.inequalities_between() {
-            for ([a, b], rate) in pair_slacks.by_ref().zip(rest.by_ref()).take(block.rows) {
-                *rate = a.dot(&step[block.at[0]]) + b.dot(&step[block.at[1]]);
-            }
-        }
-    }
-
-    /// Turns a gradient by states and controls of all nodes into that by the unknowns: states beyond the first, which
-    /// inequalities of nodes and pairs have, are carried back, and controls that follow others are folded onto these.
-    pub(crate) fn gather_gradient(&self, gradient: &mut [NodeVector<N>]) {
-        if self.layout.inequalities() > self.layout.inequalities_at_stages() {
-            self.chain.carry_back(gradient);
-        }
-        self.chain.fold(gradient);
-    }
-
-    /// Adds to a gradient the slacks' gradients, each times a factor of its row.
-    pub(crate) fn add_slack_gradients(
-        &self,
-        factor: impl Fn(usize) -> f64,
-        into: &mut [NodeVector<N>],
-    ) {
-        let layout = &self.layout;
-        let mut stage_slacks = self.stage_slacks.iter().enumerate();
-        for (stage, rows) in layout.stage_counts().enumerate() {
-            let [first, second, ..] = &mut into[stage..] else {
-                break;
-            };
-            for (row, slack) in stage_slacks.by_ref().take(rows) {
-                let factor = factor(row);
-                for i in 0..U {
-                    first[X + i] += factor * slack[0][i];
-                    second[X + i] += factor * slack[1][i];
-                }
-            }
-        }
-        let mut row = layout.inequalities_at_stages();
-        let mut node_slacks = self.node_slacks.iter();
-        for block in layout.inequalities_at() {
-            for slack in node_slacks.by_ref().take(block.rows) {
-                into[block.at] += factor(row) * slack;
-                row += 1;
-            }
-        }
-        let mut pair_slacks = self.pair_slacks.iter();
-        for block in layout.inequalities_between() {
-            for slack in pair_slacks.by_ref().take(block.rows) {
-                for (node, by) in block.at.iter().zip(slack) {
-                    into[*node] += factor(row) * by;
-                }
-                row += 1;
-            }
-        }
-    }
-
-    /// Adds the equalities' gradients, each times its multiplier.
-    pub(crate) fn add_equality_gradients(&self, multipliers: &[f64], into: &mut [NodeVector<N>]) {
-        let blocks = self.layout.equalities_at().iter();
-        for (block, pull) in blocks.zip(self.pulls_at(multipliers)) {
-            into[block.at] += pull;
-        }
-        self.add_gradients_between(multipliers, into);
-    }
-
-    /// The sum of the gradients of every block of equalities at a node, each times its multiplier.
-    fn pulls_at(&self, multipliers: &[f64]) -> impl Iterator<Item = NodeVector<N>> {
-        let mut rows = self.equalities_at.iter().zip(multipliers);
-        let blocks = self.layout.equalities_at().iter();
-        blocks.map(move |block| {
-            let rows = rows.by_ref().take(block.rows);
-            rows.fold(NodeVector::zeros(), |sum, (row, multiplier)| {
-                sum + *multiplier * row
-            })
-        })
-    }
-
-    /// Adds the gradients of the equalities between pairs, each times its multiplier.
-    fn add_gradients_between(&self, multipliers: &[f64], into: &mut [NodeVector<N>]) {
-        let between = &multipliers[self.layout.equalities_at_nodes()..];
-        let mut rows = self.equalities_between.iter().zip(between);
-        for block in self.layout.equalities_between() {
-            let mut pulls = [NodeVector::zeros(); 2];
-            for (row, multiplier) in rows.by_ref().take(block.rows) {
-                pulls[0] += *multiplier * row[0];
-                pulls[1] += *multiplier * row[1];
-            }
-            for (node, pull) in block.at.iter().zip(pulls) {
-                into[*node] += pull;
-            }
-        }
-    }
-
-    /// Adds the left-hand side of the linearised stationarity: second derivatives along a step, and the gradients of slacks
-    /// and equalities, each times its multiplier.
-    pub(crate) fn add_stationarity(
-        &self,
-        step: &[NodeVector<N>],
-        equalities: &[f64],
-        inequalities: &[f64],
-        into: &mut [NodeVector<N>],
-    ) {
-        self.add_second_derivatives(step, into);
-        self.add_slack_gradients(|row| inequalities[row], into);
-        let blocks = self.layout.equalities_at().iter().enumerate();
-        for ((i, block), pull) in blocks.zip(self.pulls_at(equalities)) {
-            let hessian = &self.diagonal.nodes[self.terms[i]].hessian;
-            into[block.at] += pull + hessian * step[block.at];
-        }
-        let first = self.layout.equalities_at().len();
-        for (i, block) in self.layout.inequalities_at().iter().enumerate() {
-            let hessian = &self.diagonal.nodes[self.terms[first + i]].hessian;
-            into[block.at] += hessian * step[block.at];
-        }
-        self.add_gradients_between(equalities, into);
-    }
-
-    /// Change of every equality along a step.
-    pub(crate) fn equality_rates(&self, step: &[NodeVector<N>], into: &mut [f64]) {
-        let (at, between) = into.split_at_mut(self.layout.equalities_at_nodes());
-        let mut rows = self.equalities_at.iter().zip(at);
-        for block in self.layout.equalities_at() {
-            for (row, rate) in rows.by_ref().take(block.rows) {
-                *rate = product(row, &step[block.at]);
-            }
-        }
-        let mut rows = self.equalities_between.iter().zip(between);
-        for block in self.layout.equalities_between() {
-            for (row, rate) in rows.by_ref().take(block.rows) {
-                *rate = product(&row[0], &step[block.at[0]]) + product(&row[1], &step[block.at[1]]);
-            }
-        }
-    }
-
-    /// Adds the second derivatives of stages and states along a step.
-    fn add_second_derivatives(&self, step: &[NodeVector<N>], into: &mut [NodeVector<N>]) {
-        let stages = self.chain.stages.iter().zip(&self.diagonal.controls);
-        for (k, (stage, own)) in stages.enumerate() {
-            let [first, second]: [SVector<f64, U>; 2] =
-                [k, k + 1].map(|node| step[node].fixed_rows::<U>(X).into_owned());
-            into[k] += stage.state_first * first + stage.state_second * second;
-            let mut by_first = own.first * first;
-            by_first.gemv(1.0, &own.mixed, &second, 1.0);
-            let mut by_second = own.mixed.tr_mul(&first);
-            by_second.gemv(1.0, &own.second, &second, 1.0);
-            by_first += stage.state_first.tr_mul(&step[k]);
-            by_second += stage.state_second.tr_mul(&step[k]);
-            let mut part = into[k].fixed_rows_mut::<U>(X);
-            part += by_first;
-            let mut part = into[k + 1].fixed_rows_mut::<U>(X);
-            part += by_second;
-        }
-        for (k, own) in self.diagonal.states.iter().enumerate() {
-            let mut by_state = into[k].fixed_rows_mut::<X>(0);
-            by_state += own * step[k].fixed_rows::<X>(0);
-        }
-    }
-
-    /// Keeps of the chain how it carries states and controls on, and nothing of what that costs.
-    pub(crate) fn forget_second_derivatives(&mut self) {
-        for stage in &mut self.chain.stages {
-            stage.state_first.fill(0.0);
-            stage.state_second.fill(0.0);
-        }
-        self.diagonal.states.clear();
-        self.diagonal.controls.fill(StageMatrix::zeros());
-        for term in &mut self.diagonal.nodes {
-            term.hessian.fill(0.0);
-        }
-    }
-}
-
-/// A sum, and to it the product of a gradient by controls with those of a node's step.
-#[inline(always)]
-fn along_controls<const X: usize, const U: usize, const N: usize>(
-    sum: f64,
-    by_controls: &SVector<f64, U>,
-    step: &NodeVector<N>,
-) -> f64 {
-    (0..U).fold(sum, |sum, i| sum + by_controls[i] * step[X + i])
-}
-
-/// Scalar product, summed in order.
-#[inline(always)]
-pub(crate) fn product<const N: usize>(a: &NodeVector<N>, b: &NodeVector<N>) -> f64 {
-    (0..N).fold(0.0, |sum, i| sum + a[i] * b[i])
 }

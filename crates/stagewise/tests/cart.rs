@@ -2,6 +2,9 @@
 //!
 //! The position is carried by the mean push of each stage, the pushes cost their square, and the cart starts at rest.
 
+mod common;
+
+use common::check::{check_derivatives, check_linear_algebra};
 use nalgebra::{SMatrix, SVector};
 use stagewise::{
     Layout, Linearisation, Multipliers, NodeVector, Outcome, Program, Settings, Solution, Values,
@@ -160,6 +163,21 @@ fn cart(goal: f64, steepest: f64, asked: Asked) -> Cart {
 }
 
 #[test]
+fn test_derivatives_agree_with_finite_differences() {
+    let ride = Ride {
+        position: vec![0.1; STAGES + 1],
+        push: (0..=STAGES).map(|k| 0.1 * (k as f64).sin()).collect(),
+    };
+    for asked in [
+        Asked::AtEnd,
+        Asked::Between([2, 5]),
+        Asked::AtLeastBetween([3, 6]),
+    ] {
+        check_derivatives(&cart(-0.5, 6.0, asked), &ride);
+    }
+}
+
+#[test]
 fn test_bound_is_active_where_the_free_optimum_breaks_it() {
     let solution = solved(&cart(1.0, 4.0, Asked::AtEnd), 0.0);
     assert_eq!(solution.outcome, Outcome::Converged);
@@ -206,6 +224,7 @@ fn test_active_inequality_between_two_nodes_is_the_equality_and_has_its_multipli
             (equality + inequality).abs() < 1e-4,
             "{equality} {inequality}"
         );
+        check_linear_algebra(&cart(0.4, 6.0, Asked::AtLeastBetween(pair)), &bounded.at);
         let inertia = bounded.inertia.unwrap();
         assert_eq!((inertia.negative, inertia.zero), (0, 0));
     }

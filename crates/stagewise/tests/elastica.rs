@@ -2,6 +2,9 @@
 //!
 //! A step of a node's state is a twist about the origin, so that twists of stages that follow each other add up.
 
+mod common;
+
+use common::check::{check_derivatives, check_linear_algebra};
 use nalgebra::{Matrix2x3, SMatrix, Vector2, Vector3};
 use num_dual::{DualNum, HyperDual64};
 use stagewise::{
@@ -298,6 +301,7 @@ fn test_arch_between_clamps_has_the_energy_of_elliptic_integrals() {
             (energy / exact - 1.0).abs() < 3e-3,
             "{distance} {energy} {exact}"
         );
+        check_linear_algebra(&clamped(distance), &found.at);
         let inertia = found.inertia.unwrap();
         assert_eq!((inertia.negative, inertia.zero), (0, 0));
     }
@@ -311,64 +315,7 @@ fn test_derivatives_agree_with_finite_differences() {
     };
     let mut at = arch(4.0);
     at.pose[0] = Vector3::new(0.2, -0.1, 0.3);
-    let mut values = Values::default();
-    rod.evaluate(&mut at, &mut values);
-    let multipliers = Multipliers {
-        equalities: vec![1.0, -2.0, 0.5, 3.0, 0.7, -1.1],
-        inequalities: Vec::new(),
-    };
-    let mut linear = Linearisation::new(rod.layout());
-    rod.linearise(&at, &multipliers, &mut linear);
-    let step = |unknowns: &[((usize, usize), f64)]| {
-        let mut step = vec![NodeVector::<4>::zeros(); STAGES + 1];
-        for ((node, entry), size) in unknowns {
-            step[*node][*entry] += size;
-        }
-        step
-    };
-    let value = |unknowns: &[((usize, usize), f64)]| {
-        let (mut moved, mut values) = (at.clone(), Values::default());
-        rod.retract(&at, &step(unknowns), 1.0, &mut moved);
-        rod.evaluate(&mut moved, &mut values);
-        let rows = values.equalities.iter().zip(&multipliers.equalities);
-        values.objective + rows.map(|(value, row)| value * row).sum::<f64>()
-    };
-    let unit = |unknown| {
-        let mut unit = step(&[(unknown, 1.0)]);
-        linear.chain.carry(&mut unit);
-        unit
-    };
-    let h = 1e-3;
-    let unknowns = [
-        (0, 0),
-        (0, 1),
-        (0, 2),
-        (0, 3),
-        (5, 3),
-        (6, 3),
-        (40, 3),
-        (64, 3),
-    ];
-    for a in unknowns {
-        let slope = (value(&[(a, h)]) - value(&[(a, -h)])) / (2.0 * h);
-        let exact = linear.gradient[a.0][a.1];
-        assert!(
-            (slope - exact).abs() < 1e-5 * exact.abs().max(1.0),
-            "{a:?} {slope} {exact}"
-        );
-        for b in unknowns {
-            let at = |x: f64, y: f64| value(&[(a, x * h), (b, y * h)]);
-            let second =
-                (at(1.0, 1.0) - at(1.0, -1.0) - at(-1.0, 1.0) + at(-1.0, -1.0)) / (4.0 * h * h);
-            let exact = linear
-                .chain
-                .second_derivative(&linear.diagonal, &unit(a), &unit(b));
-            assert!(
-                (second - exact).abs() < 1e-5 * exact.abs().max(1.0),
-                "{a:?} {b:?} {second} {exact}"
-            );
-        }
-    }
+    check_derivatives(&rod, &at);
 }
 
 #[test]

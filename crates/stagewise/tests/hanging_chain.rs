@@ -1,229 +1,275 @@
-//! A chain of rigid links hung between two points above a floor: inequalities of nodes, whose multipliers are contact forces.
-//!
-//! The control of a node is the angle of the link that follows it; the state is the node's position.
+//! A chain of stiff links hangs by its ends, with its weight at the joints, above a floor or over a disc.
 
-use nalgebra::{SMatrix, Vector2};
-use stagewise::{
-    Layout, Linearisation, Multipliers, NodeVector, Outcome, Program, Settings, Solution, Values,
-    minimise,
-};
-use std::ops::ControlFlow;
+mod common;
 
-const LINKS: usize = 24;
-const LINK: f64 = 1.0 / LINKS as f64;
-/// Weight of every inner node.
-const WEIGHT: f64 = LINK;
+use common::check::{check_derivatives, check_linear_algebra};
+use common::transcribed::{Number, Problem, Trajectory, Transcribed};
+use common::{root, solved};
+use nalgebra::SVector;
+use stagewise::{Layout, Solution};
 
-struct Chain {
-    span: f64,
-    /// Height of the floor, below the ends.
-    floor: Option<f64>,
+/// The obstacle that joints must not enter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Obstacle {
+    Nothing,
+    /// Joints stay above a height.
+    Floor(f64),
+    /// Joints stay outside of a disc, given by centre and radius.
+    Disc([f64; 2], f64),
 }
 
-#[derive(Debug, Clone, PartialEq)]
-struct Shape {
-    node: Vec<Vector2<f64>>,
-    angle: Vec<f64>,
+/// A chain of length 1. The control of a node is the angle of the link after it; the last node has none.
+#[derive(Debug, Clone)]
+struct Hanging {
+    links: usize,
+    ends: [[f64; 2]; 2],
+    obstacle: Obstacle,
 }
 
-impl Chain {
-    /// The force on a node: its weight, and the contact where `contacts` counts.
-    fn force(&self, node: usize, multipliers: &Multipliers, contacts: bool) -> Vector2<f64> {
-        let is_inner = (1..LINKS).contains(&node);
-        let mut force = Vector2::new(0.0, if is_inner { WEIGHT } else { 0.0 });
-        if contacts && is_inner && self.floor.is_some() {
-            force.y -= multipliers.inequalities[node - 1];
+type Shape = Trajectory<2, 1>;
+
+impl Hanging {
+    fn program(&self) -> Transcribed<Self> {
+        Transcribed {
+            problem: self.clone(),
         }
-        if node == LINKS {
-            force += Vector2::new(multipliers.equalities[2], multipliers.equalities[3]);
-        }
-        force
+    }
+
+    fn link(&self) -> f64 {
+        1.0 / self.links as f64
+    }
+
+    /// A weight of 1 in all.
+    fn weight(&self) -> f64 {
+        1.0 / (self.links - 1) as f64
+    }
+
+    /// Down, or up, at an angle within some links of the ends, and flat between these.
+    fn start(&self, angle: f64, links: usize) -> Shape {
+        let angle = |k: usize| match k {
+            k if k < links => angle,
+            k if k + links >= self.links => -angle,
+            _ => 0.0,
+        };
+        Trajectory::new(self.ends[0], (0..=self.links).map(|k| [angle(k)]))
     }
 }
 
-impl Program<2, 1, 3> for Chain {
-    type Point = Shape;
-
+impl Problem<2, 1, 3> for Hanging {
     fn layout(&self) -> Layout {
-        let layout = Layout::new(vec![LINK; LINKS])
+        let mut layout = Layout::new(vec![self.link(); self.links])
             .with_equalities_at(0, 2)
-            .with_equalities_at(LINKS, 2);
-        match self.floor {
-            None => layout,
-            Some(_) => (1..LINKS).fold(layout, |layout, node| {
-                layout.with_inequalities_at(node, 1, LINK)
-            }),
+            .with_equalities_at(self.links, 2);
+        if self.obstacle != Obstacle::Nothing {
+            for joint in 1..self.links {
+                layout = layout.with_inequalities_at(joint, 1, self.link());
+            }
         }
+        layout
     }
 
-    fn evaluate(&self, shape: &mut Shape, values: &mut Values) -> bool {
-        for k in 0..LINKS {
-            let (sine, cosine) = shape.angle[k].sin_cos();
-            shape.node[k + 1] = shape.node[k] + LINK * Vector2::new(cosine, sine);
-        }
-        let inner = &shape.node[1..LINKS];
-        values.objective = inner.iter().map(|node| WEIGHT * node.y).sum();
-        let last = shape.node[LINKS] - Vector2::new(self.span, 0.0);
-        values.equalities = vec![shape.node[0].x, shape.node[0].y, last.x, last.y];
-        values.slacks.clear();
-        if let Some(floor) = self.floor {
-            values
-                .slacks
-                .extend(inner.iter().map(|node| node.y - floor));
-        }
-        values.slacks.iter().all(|slack| *slack > 0.0)
+    fn free(&self, node: usize) -> [bool; 1] {
+        [node < self.links]
     }
 
-    fn equality_gradients(&self, _: &Shape, into: &mut [NodeVector<3>]) {
-        for (i, row) in into.iter_mut().enumerate() {
-            *row = NodeVector::ith(i % 2, 1.0);
-        }
+    fn carry<D: Number>(&self, _: usize, [x, y]: [D; 2], [[angle], _]: [[D; 1]; 2]) -> [D; 2] {
+        let link = self.link();
+        [x + angle.cos() * link, y + angle.sin() * link]
     }
 
-    fn linearise(
-        &self,
-        shape: &Shape,
-        multipliers: &Multipliers,
-        into: &mut Linearisation<2, 1, 3>,
-    ) {
-        into.gradient.fill(NodeVector::zeros());
-        let mut beyond = Vector2::zeros();
-        let mut bent_by = Vector2::zeros();
-        for k in (0..LINKS).rev() {
-            beyond += self.force(k + 1, multipliers, false);
-            bent_by += self.force(k + 1, multipliers, true);
-            let (sine, cosine) = shape.angle[k].sin_cos();
-            let along = LINK * Vector2::new(-sine, cosine);
-            let stage = &mut into.chain.stages[k];
-            stage
-                .growth_by_first
-                .fixed_view_mut::<2, 1>(0, 0)
-                .copy_from(&along);
-            stage.free = [k + 1 < LINKS];
-            into.gradient[k][2] = beyond.dot(&along);
-            into.diagonal.controls[k].first[(0, 0)] =
-                -LINK * bent_by.dot(&Vector2::new(cosine, sine));
-        }
-        let held = Vector2::new(multipliers.equalities[0], multipliers.equalities[1]);
-        into.gradient[0]
-            .fixed_rows_mut::<2>(0)
-            .copy_from(&(beyond + held));
-        self.equality_gradients(shape, &mut into.equalities_at);
-        into.node_slacks.fill(NodeVector::ith(1, 1.0));
+    fn cost<D: Number>(&self, stage: usize, [_, y]: [D; 2], _: [[D; 1]; 2]) -> D {
+        let carries = f64::from(u8::from(stage > 0));
+        y * (carries * self.weight())
     }
 
-    fn retract(&self, shape: &Shape, step: &[NodeVector<3>], length: f64, into: &mut Shape) {
-        into.node[0] = shape.node[0] + length * step[0].fixed_rows::<2>(0);
-        for (k, change) in step.iter().enumerate() {
-            into.angle[k] = shape.angle[k] + length * change[2];
-        }
+    fn equalities_at<D: Number>(&self, block: usize, [x, y]: [D; 2], _: [D; 1]) -> Vec<D> {
+        let end = self.ends[block];
+        vec![x - end[0], y - end[1]]
     }
 
-    fn metric(&self, _: &Shape) -> Vec<SMatrix<f64, 2, 2>> {
-        vec![SMatrix::identity() * LINK; LINKS + 1]
+    fn slacks_at<D: Number>(&self, _: usize, [x, y]: [D; 2], _: [D; 1]) -> Vec<D> {
+        match self.obstacle {
+            Obstacle::Nothing => Vec::new(),
+            Obstacle::Floor(height) => vec![y - height],
+            Obstacle::Disc(centre, radius) => {
+                let [x, y] = [x - centre[0], y - centre[1]];
+                vec![(x * x + y * y).sqrt() - radius]
+            }
+        }
     }
 }
 
-fn solved(chain: &Chain, sag: f64) -> Solution<Shape> {
-    let start = Shape {
-        node: vec![Vector2::zeros(); LINKS + 1],
-        angle: (0..=LINKS)
-            .map(|k| -sag + 2.0 * sag * k as f64 / LINKS as f64)
-            .collect(),
-    };
-    let settings = Settings {
-        tolerance: 1e-10,
-        iterations: 200,
-        barrier: 1e-2,
-    };
-    minimise(chain, &settings, start, &mut || ControlFlow::Continue(()))
+/// Angles of the links of a chain that hangs free: the horizontal tension is the same in all, the vertical one grows by the
+/// weight of a joint.
+fn free_angles(links: usize, weight: f64, [horizontal, vertical]: [f64; 2]) -> Vec<f64> {
+    let lift = |k: usize| vertical + k as f64 * weight;
+    (0..links).map(|k| (lift(k) / horizontal).atan()).collect()
 }
 
-/// Angles of a free chain under its weight, from the horizontal tension: that of every link has the same horizontal part, and
-/// the vertical one grows by a node's weight from link to link.
-fn free_angles(tension: f64) -> Vec<f64> {
-    let vertical = |k: usize| WEIGHT * (k as f64 - 0.5 * (LINKS as f64 - 1.0));
-    (0..LINKS).map(|k| (vertical(k) / tension).atan()).collect()
+/// Place of the end of links of these angles.
+fn end(angles: &[f64], link: f64) -> [f64; 2] {
+    let sum = |of: fn(f64) -> f64| link * angles.iter().map(|angle| of(*angle)).sum::<f64>();
+    [sum(f64::cos), sum(f64::sin)]
 }
 
-/// The horizontal tension at which a free chain spans a distance, by bisection.
-fn tension_of(span: f64) -> f64 {
-    let spans = |tension: f64| -> f64 { free_angles(tension).iter().map(|a| LINK * a.cos()).sum() };
-    let (mut low, mut high) = (1e-6, 1e3);
-    for _ in 0..200 {
-        let middle = 0.5 * (low + high);
-        if spans(middle) < span {
-            low = middle;
-        } else {
-            high = middle;
+/// Forces of the joints on the chain, their weight and those of the obstacle, must leave every link in a tension along it.
+#[track_caller]
+fn check_balance(chain: &Hanging, solution: &Solution<Shape>) {
+    let Shape { x, u } = &solution.at.point;
+    let multipliers = &solution.at.multipliers;
+    // A support holds against what its multipliers pull.
+    let pull =
+        |row: usize| SVector::from([multipliers.equalities[row], multipliers.equalities[row + 1]]);
+    let mut tension: SVector<f64, 2> = pull(0);
+    for k in 0..chain.links {
+        if k > 0 {
+            tension += SVector::from([0.0, chain.weight()]);
+            let push = multipliers.inequalities.get(k - 1).copied().unwrap_or(0.0);
+            tension -= match chain.obstacle {
+                Obstacle::Nothing => SVector::zeros(),
+                Obstacle::Floor(_) => SVector::from([0.0, push]),
+                Obstacle::Disc(centre, radius) => (x[k] - SVector::from(centre)) * push / radius,
+            };
         }
+        let (sine, cosine) = u[k][0].sin_cos();
+        let across = tension[1] * cosine - tension[0] * sine;
+        assert!(across.abs() < 1e-7, "link {k}: {across} across it");
+        assert!(tension[0] * cosine + tension[1] * sine > 0.0);
     }
-    0.5 * (low + high)
+    let left = tension + pull(2);
+    assert!(left.norm() < 1e-7, "{left:?} at the last end");
+    let slacks = solution.values.slacks.iter();
+    for (slack, push) in slacks.zip(&multipliers.inequalities) {
+        assert!(*slack > 0.0 && *push > 0.0 && slack * push < 1e-9);
+    }
 }
 
 #[test]
-fn test_free_chain_hangs_as_the_balance_of_its_nodes_says() {
-    let solution = solved(
-        &Chain {
-            span: 0.7,
-            floor: None,
-        },
-        0.9,
-    );
-    assert_eq!(solution.outcome, Outcome::Converged);
-    let tension = tension_of(0.7);
-    for (angle, expected) in solution.at.point.angle.iter().zip(free_angles(tension)) {
-        assert!((angle - expected).abs() < 1e-7, "{angle} {expected}");
+fn test_derivatives_of_the_chain_are_exact() {
+    for obstacle in [
+        Obstacle::Nothing,
+        Obstacle::Floor(-2.0),
+        Obstacle::Disc([0.3, -0.4], 0.1),
+    ] {
+        let chain = Hanging {
+            links: 6,
+            ends: [[0.0, 0.1], [0.7, 0.2]],
+            obstacle,
+        };
+        check_derivatives(&chain.program(), &chain.start(0.3, 2));
+    }
+}
+
+#[test]
+fn test_free_chain_hangs_in_the_discrete_catenary() {
+    let chain = Hanging {
+        links: 30,
+        ends: [[0.0, 0.0], [0.6, 0.2]],
+        obstacle: Obstacle::Nothing,
+    };
+    let solution = solved(&chain.program(), chain.start(-0.8, 15));
+    let angles = |tension: &SVector<f64, 2>| {
+        free_angles(chain.links, chain.weight(), [tension[0], tension[1]])
+    };
+    let tension = root([0.3, -0.5], |tension| {
+        let [x, y] = end(&angles(tension), chain.link());
+        SVector::from([x - 0.6, y - 0.2])
+    })
+    .expect("a catenary");
+    for (angle, u) in angles(&tension).iter().zip(&solution.at.point.u) {
+        assert!((angle - u[0]).abs() < 1e-7);
     }
     let multipliers = &solution.at.multipliers.equalities;
-    assert!((multipliers[0] - tension).abs() < 1e-7 && (multipliers[2] + tension).abs() < 1e-7);
-    let inertia = solution.inertia.unwrap();
-    assert_eq!(inertia.negative, 0);
+    assert!((multipliers[0] - tension[0]).abs() < 1e-7);
+    assert!((multipliers[1] - tension[1]).abs() < 1e-7);
+    check_balance(&chain, &solution);
 }
 
 #[test]
-fn test_chain_rests_on_the_floor_where_it_touches_and_all_forces_balance() {
-    let floor = -0.2;
-    let chain = Chain {
-        span: 0.7,
-        floor: Some(floor),
+fn test_chain_rests_on_the_floor_where_it_touches() {
+    let (links, span, floor) = (40, 0.8, -0.2);
+    let chain = Hanging {
+        links,
+        ends: [[0.0, 0.0], [span, 0.0]],
+        obstacle: Obstacle::Floor(floor),
     };
-    let solution = solved(&chain, 0.25);
-    assert_eq!(
-        solution.outcome,
-        Outcome::Converged,
-        "{:?}",
-        solution.residuals
-    );
-    let shape = &solution.at.point;
-    let free = solved(
-        &Chain {
-            span: 0.7,
-            floor: None,
-        },
-        0.9,
-    );
-    assert!(solution.values.objective > free.values.objective + 1e-3);
-    let contacts = &solution.at.multipliers.inequalities;
-    let touching = contacts.iter().filter(|force| **force > 1e-4).count();
-    assert!(touching > 2 && touching < LINKS - 4, "{touching}");
-    for (node, contact) in shape.node[1..LINKS].iter().zip(contacts) {
-        assert!((node.y - floor) * contact < 1e-9);
-    }
-    // Contact forces and the ends bear the weight.
-    let held = &solution.at.multipliers.equalities;
-    let up: f64 = contacts.iter().sum::<f64>() - held[1] - held[3];
-    assert!((up - WEIGHT * (LINKS as f64 - 1.0)).abs() < 1e-8, "{up}");
-    // The horizontal tension is the same everywhere: vertical forces change at the nodes alone.
-    let tension = held[0];
-    let mut vertical = held[1];
-    for k in 0..LINKS {
-        if k > 0 {
-            vertical += WEIGHT - contacts[k - 1];
-        }
+    let solution = solved(&chain.program(), chain.start(-1.0, 9));
+    check_balance(&chain, &solution);
+    // Both sides hang free down to a joint on the floor; between these the links lie flat. Which joint it is shows by its
+    // push.
+    let (link, weight) = (chain.link(), chain.weight());
+    let hanging = |hung: usize| {
+        let angles =
+            |tension: &SVector<f64, 2>| free_angles(hung, weight, [tension[0], tension[1]]);
+        let flat = (links / 2 - hung) as f64 * link;
+        let tension = root([0.1, -0.2], |tension| {
+            let [x, y] = end(&angles(tension), link);
+            SVector::from([x + flat - 0.5 * span, y - floor])
+        })?;
+        Some((
+            angles(&tension),
+            weight + tension[1] + (hung - 1) as f64 * weight,
+        ))
+    };
+    let found = (6..links / 2).find_map(|hung| {
+        let (angles, push) = hanging(hung)?;
+        (0.0..=weight)
+            .contains(&push)
+            .then_some((hung, angles, push))
+    });
+    let (hung, angles, push) = found.expect("a joint where the chain comes to lie");
+    for (k, u) in solution.at.point.u[..links / 2].iter().enumerate() {
+        let expected = angles.get(k).copied().unwrap_or(0.0);
         assert!(
-            (vertical / tension - shape.angle[k].tan()).abs() < 1e-5,
-            "{k}"
+            (u[0] - expected).abs() < 1e-5,
+            "link {k}: {u} for {expected}"
         );
     }
+    let pushes = &solution.at.multipliers.inequalities;
+    for (joint, own) in (1..links).zip(pushes) {
+        let from_end = joint.min(links - joint);
+        let expected = match from_end.cmp(&hung) {
+            std::cmp::Ordering::Less => 0.0,
+            std::cmp::Ordering::Equal => push,
+            std::cmp::Ordering::Greater => weight,
+        };
+        assert!(
+            (own - expected).abs() < 1e-5,
+            "joint {joint}: {own} for {expected}"
+        );
+    }
+    // Floor and supports bear the weight.
+    let supports = &solution.at.multipliers.equalities;
+    let borne = pushes.iter().sum::<f64>() - supports[1] - supports[3];
+    assert!((borne - 1.0).abs() < 1e-8);
+}
+
+#[test]
+fn test_chain_over_a_disc_is_pushed_square_to_it() {
+    let chain = Hanging {
+        links: 30,
+        ends: [[-0.3, -0.1], [0.35, 0.0]],
+        obstacle: Obstacle::Disc([0.0, -0.1], 0.2),
+    };
+    let solution = solved(&chain.program(), chain.start(0.86, 15));
+    check_balance(&chain, &solution);
+    let pushes = &solution.at.multipliers.inequalities;
+    let touching = pushes.iter().filter(|push| **push > 1e-4).count();
+    assert!(touching >= 3, "{pushes:?}");
+    check_linear_algebra(&chain.program(), &solution.at);
+    // The derivative of the energy by the radius is the sum of the contact forces.
+    let energy = |radius: f64| {
+        let other = Hanging {
+            obstacle: Obstacle::Disc([0.0, -0.1], radius),
+            ..chain.clone()
+        };
+        solved(&other.program(), other.start(0.86, 15))
+            .values
+            .objective
+    };
+    let slope = (energy(0.2001) - energy(0.1999)) / 2e-4;
+    assert!(
+        (slope - pushes.iter().sum::<f64>()).abs() < 1e-3 * slope,
+        "{slope}"
+    );
 }

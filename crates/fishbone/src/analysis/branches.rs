@@ -1,17 +1,17 @@
-//! All equilibria of a problem that the search finds: many starts, then perturbations of each minimum and continuation in
-//! modal loads from each equilibrium.
+//! A search for all equilibria of a problem: many starts, then perturbations of each minimum and continuation in modal loads
+//! from each equilibrium.
 //!
 //! The starts are arches to either side with waves of bend and of rib slope laid over them, and lead to minima. A minimum
 //! perturbed along its lowest modes leads downhill to other minima. A load along one of the lowest modes of an equilibrium,
 //! continued until it is zero again, leads to another equilibrium, of one negative mode more or less. From a saddle the energy
 //! falls to both sides of its lowest mode.
 
+mod settings;
 mod starts;
 
-use crate::analysis::symmetry::{SAME, are_twins};
-use crate::equilibrium::{
-    Equilibrium, Status, is_settled, minimum_from, minimum_next_to, of_solution,
-};
+pub use settings::{SearchSettings, Wave};
+
+use crate::equilibrium::{Equilibrium, Status, minimum_from, minimum_next_to, of_solution};
 use crate::problem::Problem;
 use crate::problem::program::{BeltPoint, BeltProgram};
 use crate::scenario::Method;
@@ -24,148 +24,15 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// A mode of the programme.
 type Mode = stagewise::Mode<8>;
 
-/// What the search does, and what it takes for the same; by default what finds all that is known to be there.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SearchSettings {
-    /// Waves of bend, laid over every arch and the straight belt; amplitudes in 1/U.
-    pub bend_waves: Vec<Wave>,
-    /// Waves of rib slope, each laid over with every wave of bend; amplitudes, a number.
-    pub slope_waves: Vec<Wave>,
-    /// Sums of waves from which the search starts as well, a number.
-    pub sums: usize,
-    /// Minima that are perturbed, the largest number.
-    pub perturbed: usize,
-    /// Modes along which a minimum is perturbed, a number.
-    pub perturbed_modes: usize,
-    /// Displacements of a minimum along each of these, in norms of the mode.
-    pub perturbations: Vec<f64>,
-    /// Equilibria that are continued in modal loads, the largest number.
-    pub continued: usize,
-    /// Equilibria continued at a time, so that lower ones that are found meanwhile come first; a number.
-    pub at_a_time: usize,
-    /// Modes along which an equilibrium is loaded, by its number of negative modes; one of more is not reported; a number each.
-    pub loaded_modes: [usize; 3],
-    /// Displacement from a saddle along its lowest mode, from where it is downhill, in norms of the mode.
-    pub off_saddle: f64,
-    /// Elements of the mesh that confirms an equilibrium, in those of the scenario.
-    pub refinement: usize,
-    /// Difference of energy up to which two equilibria on one mesh may be the same, a share.
-    pub same_level: f64,
-    /// Distance of nodes up to which two equilibria on one mesh may be the same, in U.
-    pub same_distance: f64,
-    /// Difference of energy up to which two equilibria on different meshes may be the same, a share.
-    pub like_level: f64,
-    /// Distance of nodes up to which two equilibria on different meshes may be the same, in U.
-    pub like_distance: f64,
-    /// Bending energy of a belt that counts as flat, in the scenario's unit of energy.
-    pub flat_energy: f64,
-    /// Bulge by which one mirror image is the higher, in U.
-    pub higher: f64,
-    /// Miss of the supports up to which a mirror image meets them, lengths in U and angles in rad.
-    pub miss: f64,
-}
-
-/// A wave along the belt.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Wave {
-    /// Half waves over the length of the belt, a number.
-    pub half_waves: f64,
-    /// Largest value, in the unit of what waves.
-    pub amplitude: f64,
-}
-
-impl Default for SearchSettings {
-    fn default() -> Self {
-        let waves = |waves: &[(f64, f64)]| {
-            let wave = |&(half_waves, amplitude)| Wave {
-                half_waves,
-                amplitude,
-            };
-            waves.iter().map(wave).collect()
-        };
-        Self {
-            bend_waves: waves(&[
-                (0.0, 0.0),
-                (0.0, 4.0),
-                (0.0, -4.0),
-                (1.0, 4.0),
-                (1.0, -4.0),
-                (2.0, 8.0),
-                (2.0, -8.0),
-                (3.0, 12.0),
-                (3.0, -12.0),
-            ]),
-            slope_waves: waves(&[(1.0, 0.0), (1.0, 0.5), (1.0, -0.5), (2.0, 0.5), (2.0, -0.5)]),
-            sums: 4000,
-            perturbed: 96,
-            perturbed_modes: 4,
-            perturbations: vec![0.1, -0.1, 0.3, -0.3],
-            continued: 16,
-            at_a_time: 4,
-            loaded_modes: [6, 4, 0],
-            off_saddle: 0.01,
-            refinement: 2,
-            same_level: 1e-4,
-            same_distance: SAME,
-            like_level: 0.02,
-            like_distance: 0.03,
-            flat_energy: 1e-6,
-            higher: 1e-9,
-            miss: 1e-6,
-        }
-    }
-}
-
-impl SearchSettings {
-    /// Most negative modes of an equilibrium that is reported.
-    fn highest_index(&self) -> usize {
-        self.loaded_modes.len() - 1
-    }
-
-    /// Whether two equilibria are the same but for a symmetry.
-    fn is_same(&self, a: &Equilibrium, b: &Equilibrium) -> bool {
-        self.is_within(a, b, self.same_level, self.same_distance)
-    }
-
-    /// Whether two equilibria may be the same but for a symmetry and the mesh.
-    fn is_like(&self, a: &Equilibrium, b: &Equilibrium) -> bool {
-        self.is_within(a, b, self.like_level, self.like_distance)
-    }
-
-    /// Whether two equilibria differ by no more than a share of the energy and a distance in U, and in no number of negative
-    /// modes.
-    fn is_within(&self, a: &Equilibrium, b: &Equilibrium, share: f64, distance: f64) -> bool {
-        let solved = || Some((a.solved.as_ref()?, b.solved.as_ref()?));
-        let is_level = (a.energy - b.energy).abs() <= share * self.size(a).max(self.size(b));
-        let index = |e: &Equilibrium| e.stability.map(|s| s.negative_modes);
-        is_level
-            && index(a) == index(b)
-            && solved()
-                .is_some_and(|(a, b)| are_twins(&a.at.point.poses, &b.at.point.poses, distance))
-    }
-
-    /// What differences of energy are measured by: that of bending, as the zero of a load's potential is anywhere; of a flat
-    /// belt next to nothing.
-    fn size(&self, equilibrium: &Equilibrium) -> f64 {
-        let unit = equilibrium.problem.units().energy;
-        equilibrium.elastic_energy.max(self.flat_energy * unit)
-    }
-
-    /// Whether one of two mirror images bulges more as the scenario asks.
-    fn is_higher(&self, one: &Equilibrium, other: &Equilibrium) -> bool {
-        height(one) > height(other) + self.higher * one.spine.length()
-    }
-}
-
 /// Runs `task(i)` for every i below a number, in any order and on any thread.
-pub type Run<'a> = dyn Fn(usize, &(dyn Fn(usize) + Sync)) + 'a;
+pub(crate) type Run<'a> = dyn Fn(usize, &(dyn Fn(usize) + Sync)) + 'a;
 
-/// What is asked and reported while the search goes on, from any thread.
+/// Control and progress of the search, from any thread.
 pub trait Watch: Sync {
     /// Whether to go on.
     fn proceed(&self) -> ControlFlow<()>;
 
-    /// Number of tasks done, and of tasks planned so far.
+    /// Reports the number of tasks done, and of tasks planned by now.
     fn report(&self, done: usize, planned: usize);
 }
 
@@ -177,9 +44,8 @@ pub fn one_by_one(count: usize, task: &(dyn Fn(usize) + Sync)) {
 /// The equilibria of a problem, rising in energy: minima, and saddles with one or two
 /// negative modes.
 ///
-/// Of shapes that are mirror images of each other the one is reported that bulges as the scenario asks. The same input gives
-/// the same output, whatever runs the tasks. Where nothing is found, the outcome of a solve is reported, whose message gives
-/// the reason.
+/// Of mirror images the one that bulges along `solver.bulge` is reported. The same input gives the same output, however the
+/// tasks are run. If nothing is found, the outcome of a solve is reported, whose message gives the reason.
 pub fn branches(
     problem: &Problem,
     settings: &SearchSettings,
@@ -215,7 +81,7 @@ pub fn branches(
     found
 }
 
-/// What has been found so far.
+/// The equilibria found so far.
 struct Census<'a> {
     problem: &'a Problem,
     settings: &'a SearchSettings,
@@ -227,7 +93,7 @@ struct Census<'a> {
 }
 
 impl Census<'_> {
-    /// Runs a task for each item; what comes out, in the order of the items.
+    /// Runs a task for each item; returns the results in the order of the items.
     fn each<T: Sync, R: Send + Sync>(
         &mut self,
         items: &[T],
@@ -265,7 +131,7 @@ impl Census<'_> {
         }
     }
 
-    /// The equilibria lowest in energy among those that `may` be chosen and are like none `known`; they are known from then on.
+    /// The equilibria lowest in energy that `may` be chosen and are like none `known`; they are added to `known`.
     fn lowest_unlike(
         &self,
         known: &mut Vec<Equilibrium>,
@@ -301,8 +167,8 @@ impl Census<'_> {
         }
     }
 
-    /// Perturbs the minima along their lowest modes, the lowest in energy first, and the minima found so in turn; of minima
-    /// that are alike one.
+    /// Perturbs the minima along their lowest modes, the lowest in energy first, and the minima found in this way in turn;
+    /// of minima that are alike only one.
     fn perturb(&mut self) {
         let mut perturbed = Vec::new();
         loop {
@@ -325,7 +191,8 @@ impl Census<'_> {
         }
     }
 
-    /// Continues the equilibria in loads along their lowest modes, the lowest in energy first, and those found so in turn.
+    /// Continues the equilibria in loads along their lowest modes, the lowest in energy first, and the equilibria found in
+    /// this way in turn.
     fn load(&mut self) {
         let mut continued = Vec::new();
         loop {
@@ -357,7 +224,8 @@ impl Census<'_> {
         }
     }
 
-    /// Keeps the equilibria that a mesh twice as fine has too; of equilibria that the mesh does not separate the lowest.
+    /// Keeps the equilibria that are confirmed on a mesh twice as fine; of equilibria that this mesh does not separate, the
+    /// lowest.
     fn confirm(&mut self) {
         let mut found = std::mem::take(&mut self.found);
         found.sort_by(|a, b| a.energy.total_cmp(&b.energy));
@@ -382,7 +250,7 @@ impl Census<'_> {
         }
     }
 
-    /// Takes the mirror image of a minimum for it, where that meets the supports too and bulges more as asked.
+    /// Replaces a minimum by its mirror image if the image meets the supports too and bulges more along `solver.bulge`.
     fn face(&mut self) {
         let found = std::mem::take(&mut self.found);
         let (settings, watch) = (self.settings, self.watch);
@@ -392,13 +260,13 @@ impl Census<'_> {
     }
 }
 
-/// The mirror image that bulges most, where it does so more than the minimum itself.
+/// The mirror image that bulges most; `None` unless it bulges more than the minimum itself.
 fn facing(
     settings: &SearchSettings,
     found: &Equilibrium,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Option<Equilibrium> {
-    /// Mirrors: signs of bend and of rib slope.
+    /// Mirrors, as signs of bend and of rib slope, dimensionless.
     const MIRRORS: [[f64; 2]; 3] = [[-1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]];
     let solved = found.solved.as_ref()?;
     let stable = found.stability.is_none_or(|s| s.negative_modes == 0);
@@ -422,7 +290,7 @@ fn facing(
     settings.is_higher(&highest, found).then_some(highest)
 }
 
-/// The same equilibrium on a mesh twice as fine; `None` where there is none like it.
+/// The same equilibrium on a mesh twice as fine; `None` if it is unconfirmed on refinement.
 fn on_finer_mesh(
     settings: &SearchSettings,
     found: &Equilibrium,
@@ -443,7 +311,7 @@ fn lowest_modes(equilibrium: &Equilibrium, count: usize) -> Vec<Mode> {
     modes.unwrap_or_default()
 }
 
-/// The minima that are found from where a minimum has been displaced far along a mode.
+/// The minima found from a minimum displaced far along a mode.
 fn perturbed_along(
     problem: &Problem,
     settings: &SearchSettings,
@@ -460,7 +328,7 @@ fn perturbed_along(
         .collect()
 }
 
-/// The equilibrium that a modal load leads to and, where that is a saddle, the minima downhill on either side.
+/// The equilibrium to which a modal load leads and, if it is a saddle, the minima downhill on either side.
 fn beyond_modal_load(
     problem: &Problem,
     settings: &SearchSettings,
@@ -480,7 +348,7 @@ fn beyond_modal_load(
         return Vec::new();
     };
     let mut found = downhill(problem, settings, program, &other, watch);
-    if is_settled(problem, program, &other.point) {
+    if problem.active_set_fault(program, &other.point).is_none() {
         let solution = stagewise::assess(program, tolerance, &other);
         found.push(of_solution(problem, program.clone(), solution));
     }
@@ -506,12 +374,12 @@ fn downhill(
         .collect()
 }
 
-/// Number of negative modes, 0 where that is open.
+/// Number of negative modes, 0 where it is undecided.
 fn index(equilibrium: &Equilibrium) -> usize {
     equilibrium.stability.map_or(0, |s| s.negative_modes)
 }
 
-/// How far an equilibrium bulges as its scenario asks.
+/// Bulge of an equilibrium along its scenario's `solver.bulge`.
 fn height(equilibrium: &Equilibrium) -> f64 {
     let bulge = equilibrium.problem.bulge();
     equilibrium.highest_point().position.dot(&bulge.normalize())

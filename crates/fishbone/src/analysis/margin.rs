@@ -1,26 +1,24 @@
-//! How far a support may move before the belt loses its stability.
+//! The stability margin: the distance a support may move before the belt loses its stability.
 
-use crate::analysis::continuation::{NoBranch, is_near_limit, meshed};
+use crate::analysis::continuation::NoBranch;
+use crate::analysis::family::{Along, Station};
 use crate::analysis::path::{Motion, NoPath, Path};
-use crate::equilibrium::{Equilibrium, Uncertified, is_settled};
+use crate::equilibrium::{Equilibrium, Uncertified};
 use crate::geometry::{Pose, exp, log};
 use crate::names::named;
 use crate::problem::Mesh;
-use crate::problem::program::{BeltPoint, BeltProgram, rows_of};
+use crate::problem::program::rows_of;
 use nalgebra::{Vector3, Vector6};
-use stagewise::{Continuation, End, Events, Family, Pace, Turn};
+use stagewise::{Continuation, End, Events, Pace, Turn};
 use std::ops::ControlFlow;
 use thiserror::Error;
 
-/// A station of a branch.
-type Station = stagewise::Station<BeltPoint, 8>;
-
-/// A way to the loss of stability.
+/// A motion of a support to the loss of stability.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Margin {
-    /// How far it is: the norm of displacement in U and rotation in rad.
+    /// Distance: the norm of displacement in U and rotation in rad.
     pub distance: f64,
-    /// Where to: displacement and rotation left in world axes, of norm 1.
+    /// Direction: displacement and rotation left in world axes, of norm 1.
     pub direction: Vector6<f64>,
     /// Whether stability ends in a fold, where the belt snaps; else other equilibria branch off.
     pub is_fold: bool,
@@ -30,26 +28,27 @@ pub struct Margin {
     pub rotation: Vector3<f64>,
 }
 
-/// How hard the nearest loss of stability is looked for, and what is taken for near, far and the same.
+/// Settings of the search for the nearest loss of stability: its extent, steps and tolerances.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MarginSettings {
-    /// Nearest places on the boundary from which the search goes on, the largest number.
+    /// Greatest count of places on the boundary from which the search goes on, the nearest first, a number.
     pub refined: usize,
-    /// Distance up to which others are looked for to go on from, in that of the nearest place that is known.
+    /// Distance up to which other places are sought to go on from, in distances of the nearest known place.
     pub farther: f64,
-    /// Turns to the side of a way that ends where others branch off, in rad where small.
+    /// Turns to the side of a direction that ends where other equilibria branch off, as tangents of the angle.
     pub aside: [f64; 2],
-    /// Rounds along the boundary's normal from each place, the largest number.
+    /// Greatest count of rounds along the boundary's normal from each place, a number.
     pub rounds: usize,
-    /// Deviation of the normal from the way that was taken at which these are the same, 1 − cos of the angle.
+    /// Deviation of the normal from the direction taken below which they are the same, as 1 − cos of the angle,
+    /// dimensionless.
     pub same_way: f64,
-    /// Step of the differences by which eigenvalues fall, in U and rad.
+    /// Step of the differences that give the fall of eigenvalues, in U and rad.
     pub difference: f64,
     /// Turn of a leg, less than half a turn, in rad.
     pub leg: f64,
-    /// Step along a way, the longest, in U and rad.
+    /// Longest step along a direction, in U and rad.
     pub step: f64,
-    /// States along a way, the largest number.
+    /// Greatest count of states along a direction, a number.
     pub states: usize,
 }
 
@@ -69,7 +68,7 @@ impl Default for MarginSettings {
     }
 }
 
-/// Why there is no margin.
+/// The reason why there is no margin.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum NoMargin {
@@ -79,7 +78,7 @@ pub enum NoMargin {
     /// The equilibrium cannot be followed.
     #[error(transparent)]
     NoBranch(#[from] NoBranch),
-    /// It is none that is stable.
+    /// The equilibrium is not stable.
     #[error("the equilibrium is not stable: it has no stability to lose")]
     NotStable,
     /// The support does not hold all of a pose.
@@ -87,10 +86,10 @@ pub enum NoMargin {
         "supports[{0}] does not hold a position and a rotation, all of both: nothing can be moved there"
     )]
     NotClamped(usize),
-    /// The support may not be moved so far, or not at all.
+    /// The support may not be moved to a pose on the way.
     #[error(transparent)]
     NoPath(#[from] NoPath),
-    /// The equilibrium could be followed only so far, stable on the way.
+    /// The equilibrium was lost on the way, stable up to a reported distance.
     #[error(
         "the equilibrium could be followed only {0:.3} of the way to `reach`, stable until there: a shorter reach may do"
     )]
@@ -106,20 +105,20 @@ named!(impl NoMargin {
     ..NoPath,
 });
 
-/// The boundary of stability, as it is met along a direction.
+/// A point on the boundary of stability, reached along a direction.
 struct Boundary {
     margin: Margin,
-    /// The change of the support's reaction along the mode that vanishes, of norm 1: square to the boundary where that is a
-    /// fold; where others branch off, the way on which they come apart.
+    /// The change of the support's reaction along the mode that vanishes, of norm 1: normal to the boundary at a fold; at a
+    /// bifurcation, the direction along which the branches separate.
     across: Option<Vector6<f64>>,
 }
 
 impl Equilibrium {
-    /// How far a support may move along a direction before stability is lost; `None` where that is not so within `reach`, and
-    /// where the belt comes to its inextensible limit before.
+    /// Distance a support may move along a direction before stability is lost; `None` if stability is kept within `reach`,
+    /// or if the belt comes to its inextensible limit before.
     ///
-    /// Directions are displacement in U and rotation left in world axes about the support point; their length does not matter.
-    /// `proceed` is asked once a step whether to go on.
+    /// Directions are displacement in U and rotation left in world axes about the support point; their length does not
+    /// matter. `proceed` is asked once a step whether to go on.
     ///
     /// # Errors
     ///
@@ -137,9 +136,9 @@ impl Equilibrium {
         Ok(found.map(|boundary| boundary.margin))
     }
 
-    /// The same to wherever it is nearest, as far as can be told: from places along the six axes, and along the ways on which
-    /// the lowest eigenvalues of the second variation fall fastest, on along the normal of the boundary there, until that
-    /// is the way that was taken.
+    /// The nearest loss of stability that a local search finds. The search starts from places along the six axes and along
+    /// the directions in which the lowest eigenvalues of the second variation fall fastest. From each place it goes on along
+    /// the normal of the boundary, until the normal is the direction taken.
     ///
     /// # Errors
     ///
@@ -169,7 +168,7 @@ impl Equilibrium {
         for direction in steepest.into_iter().chain(axes) {
             look(&direction, &mut found)?;
         }
-        // Where others branch off, the boundary has an edge: folds lie nearer to either side of it.
+        // At a bifurcation the boundary has an edge: folds lie nearer to either side of it.
         let edges = found
             .iter()
             .filter(|b| !b.margin.is_fold)
@@ -196,7 +195,8 @@ impl Equilibrium {
             .min_by(|a, b| a.distance.total_cmp(&b.distance)))
     }
 
-    /// From a place on the boundary of stability on along its normal, until that is the way that was taken.
+    /// The nearest place found from a place on the boundary of stability by going on along its normal, until the normal is
+    /// the direction taken.
     fn nearest_from(
         &self,
         support: usize,
@@ -212,7 +212,7 @@ impl Equilibrium {
             if 1.0 - towards.dot(&best.margin.direction) < settings.same_way {
                 break;
             }
-            // All the way, or half of it where that leads to no nearer place.
+            // The whole turn to the normal, or half of it if the whole turn leads to no nearer place.
             let mut nearer = None;
             for way in [towards, (towards + best.margin.direction).normalize()] {
                 let far = best.margin.distance;
@@ -240,7 +240,7 @@ impl Equilibrium {
         settings: &MarginSettings,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Result<Vec<Vector6<f64>>, NoMargin> {
-        /// Lowest eigenvalues of which each gives a direction, a number.
+        /// Lowest eigenvalues, each of which gives a direction, a number.
         const LOWEST: usize = 2;
         let mut gradients = [Vector6::zeros(); LOWEST];
         for axis in 0..6 {
@@ -251,7 +251,7 @@ impl Equilibrium {
                 let solved = self.certified()?;
                 let continuation = way.continuation();
                 let modes = continuation
-                    .start(&solved.at, way.path.length(), true)
+                    .start(&solved.at, way.length(), true)
                     .and_then(|station| continuation.modes(&station, LOWEST));
                 let Some(modes) = modes.filter(|modes| modes.len() == LOWEST) else {
                     return Ok(Vec::new());
@@ -271,7 +271,7 @@ impl Equilibrium {
         Ok(falling.map(|gradient| -gradient.normalize()).collect())
     }
 
-    /// Where stability is lost along a direction of norm 1.
+    /// The place where stability is lost along a direction of norm 1.
     fn boundary(
         &self,
         support: usize,
@@ -286,8 +286,8 @@ impl Equilibrium {
         let start = continuation.start(&solved.at, 0.0, true);
         let start = start.ok_or(NoBranch::Singular)?;
         let curve = continuation.trace(start, &mut |_| proceed());
-        let length = way.path.length();
-        let is_open = |station: &Station| station.negative == 0 && way.holds(station);
+        let length = way.length();
+        let is_open = |station: &Station| station.negative == 0 && way.family.holds(station);
         let stable = curve
             .stations
             .iter()
@@ -297,7 +297,7 @@ impl Equilibrium {
             .last()
             .map_or(0.0, |station| station.parameter);
         let event = curve.events.first().filter(|(state, _)| *state <= stable);
-        let is_near_limit = is_near_limit(&way.path, last);
+        let is_near_limit = way.family.is_near_limit(last);
         let Some((_, event)) =
             event.filter(|(_, event)| event.turn != Turn::Apex || !is_near_limit)
         else {
@@ -330,19 +330,18 @@ impl Equilibrium {
     }
 }
 
-/// A support's way along a direction of norm 1.
+/// The path of a support along a direction of norm 1.
 struct Way {
-    path: Path,
-    mesh: Mesh,
+    family: Along,
     from: Pose,
     direction: Vector6<f64>,
-    /// U.
-    length: f64,
+    /// Unit of length U.
+    unit: f64,
     pace: Pace,
 }
 
 impl Way {
-    /// So far, in legs that turn by less than half a turn.
+    /// The path over a distance, in legs that turn by less than half a turn.
     fn new(
         equilibrium: &Equilibrium,
         support: usize,
@@ -357,22 +356,24 @@ impl Way {
         let problem = &equilibrium.problem;
         let from = problem.clamp(support);
         let from = from.ok_or(NoMargin::NotClamped(support))?;
-        let length = problem.units().length;
+        let unit = problem.units().length;
         let legs = (reach * direction.fixed_rows::<3>(3).norm() / settings.leg)
             .ceil()
             .max(1.0);
         let ends = (1..=legs as usize).map(|leg| {
-            let end = displaced(&from, direction, length, reach * leg as f64 / legs);
+            let end = displaced(&from, direction, unit, reach * leg as f64 / legs);
             (end.position, log(&end.frame))
         });
         let poses: Vec<_> = ends.collect();
         let path = Path::poses(problem, support, &poses, Motion::Straight);
         Ok(Self {
-            path: path?,
-            mesh: Mesh::of(problem, &solved.program),
+            family: Along {
+                path: path?,
+                mesh: Mesh::of(problem, &solved.program),
+            },
             from,
             direction: *direction,
-            length,
+            unit,
             pace: Pace {
                 longest: settings.step,
                 stations: settings.states,
@@ -381,37 +382,27 @@ impl Way {
         })
     }
 
-    /// The support's pose so far along.
+    /// The support's pose at a distance along the path.
     fn pose_at(&self, far: f64) -> Pose {
-        displaced(&self.from, &self.direction, self.length, far)
+        displaced(&self.from, &self.direction, self.unit, far)
     }
 
-    fn continuation(&self) -> Continuation<'_, Self, 6, 2, 8> {
-        let tolerance = self.path.base().tolerance();
-        Continuation::new(self, tolerance, [0.0, self.path.length()], self.pace)
+    /// Length of the path.
+    fn length(&self) -> f64 {
+        self.family.path.length()
     }
 
-    /// Whether the ribs are held by the edges that they reach, and by no other.
-    fn holds(&self, station: &Station) -> bool {
-        let meshed = meshed(&self.path, &self.mesh, station.parameter);
-        meshed.is_some_and(|(problem, program)| is_settled(&problem, &program, &station.at.point))
+    fn continuation(&self) -> Continuation<'_, Along, 6, 2, 8> {
+        let tolerance = self.family.path.base().tolerance();
+        Continuation::new(&self.family, tolerance, [0.0, self.length()], self.pace)
     }
 }
 
-/// A pose so far along a direction, lengths in a unit.
+/// A pose displaced by a distance along a direction, lengths in a unit.
 fn displaced(from: &Pose, direction: &Vector6<f64>, unit: f64, far: f64) -> Pose {
     let [shift, turn] = [0, 3].map(|i| far * direction.fixed_rows::<3>(i).into_owned());
     Pose {
         position: from.position + unit * shift,
         frame: exp(&turn) * from.frame,
-    }
-}
-
-impl Family<6, 2, 8> for Way {
-    type Point = BeltPoint;
-    type Program = BeltProgram;
-
-    fn at(&self, place: f64) -> Option<BeltProgram> {
-        self.path.at(place)?.program_on(&self.mesh)
     }
 }

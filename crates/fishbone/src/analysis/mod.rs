@@ -1,7 +1,8 @@
-//! What is found out about equilibria: modes, derivatives, tracking, paths, margins, all equilibria of a problem.
+//! Analysis of equilibria: modes, derivatives, tracking, paths, margins, all equilibria of a problem.
 
 pub mod branches;
 pub mod continuation;
+mod family;
 pub mod margin;
 pub mod modes;
 pub mod path;

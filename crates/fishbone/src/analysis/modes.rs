@@ -10,11 +10,11 @@ use thiserror::Error;
 /// A motion of the belt from an equilibrium, one of the lowest of a set that the second variation does not couple; in the
 /// units of the scenario.
 ///
-/// Its scale is such that the mean over the board of the squared displacement is 1: that of a strip across the spine that
-/// turns with the frame, V²/12 about the spine, all of the board weighing alike.
+/// Its scale is such that the mean over the board of the squared displacement is 1: a strip across the spine turns with the
+/// frame, V²/12 about the spine, and the board has uniform weight.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mode {
-    /// Second variation of the energy: twice what it rises by, per squared displacement.
+    /// Second variation of the energy: twice its rise per squared displacement.
     pub eigenvalue: f64,
     /// Motion of every node.
     pub motion: Vec<Motion>,
@@ -24,7 +24,7 @@ pub struct Mode {
     pub rib_slope: Vec<f64>,
 }
 
-/// Why an equilibrium has no modes.
+/// The reason why an equilibrium has no modes.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum NoModes {

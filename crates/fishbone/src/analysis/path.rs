@@ -1,5 +1,6 @@
-//! Ways through the space of problems: one number or several that change together, or a support that moves.
+//! Paths through the space of problems: one number or several that change together, or a support that moves.
 
+use crate::analysis::sensitivity::Motion as SupportMotion;
 use crate::geometry::{Pose, Twist, exp, log};
 use crate::names::named;
 use crate::problem::Problem;
@@ -9,27 +10,33 @@ use std::fmt::Debug;
 use std::sync::Arc;
 use thiserror::Error;
 
-/// What changes along a path.
+/// A change of a problem along a path.
 pub trait Change: Debug + Send + Sync {
     /// The problem at a place on the path that begins at `base`, or a little before or beyond it.
     ///
     /// # Errors
     ///
-    /// Where there is no such problem.
+    /// [`NoPath`] where there is no valid problem.
     fn problem(&self, base: &Problem, place: f64) -> Result<Problem, NoPath>;
 
-    /// How far the path goes from 0.
+    /// The support that moves at a place on the path, if nothing else changes there, with its motion per unit of place:
+    /// displacement in the unit of the scenario, rotation left in world axes.
+    fn support_motion(&self, _place: f64) -> Option<(usize, SupportMotion)> {
+        None
+    }
+
+    /// Length of the path, which begins at 0.
     fn length(&self) -> f64 {
         1.0
     }
 
-    /// What a place on the path is called.
+    /// The parameter of a place on the path, for reports.
     fn parameter(&self, place: f64) -> f64 {
         place
     }
 }
 
-/// How a problem changes: the problem where the path begins, and what differs from place to place.
+/// A path: the problem at its start, and the change from place to place.
 ///
 /// A clone shares the change.
 #[derive(Debug, Clone)]
@@ -58,21 +65,21 @@ named! {
     }
 }
 
-/// Why there is no such path.
+/// The reason why a path cannot be made.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum NoPath {
-    /// No number stands there.
+    /// The field holds no number.
     #[error("{field}: found {found}, allowed a number that the scenario gives, as in {example}")]
     NoNumber {
-        /// What was asked for.
+        /// Path of the field.
         field: String,
-        /// What stands there.
+        /// The value of the field.
         found: String,
-        /// What could have been asked for.
+        /// A field that holds a number.
         example: String,
     },
-    /// Nothing changes along it.
+    /// Nothing changes along the path.
     #[error("path: found nothing that changes, allowed a number with another value, or poses")]
     Nothing,
     /// The support does not hold all of a pose.
@@ -83,10 +90,10 @@ pub enum NoPath {
     /// The support may not be held at one of the poses, counted from 0.
     #[error("poses[{0}]: {1}")]
     NoPose(usize, String),
-    /// The scenario at its end is not valid.
+    /// The scenario at the path's end is not valid.
     #[error("at the end of the path, {0}")]
     Invalid(ScenarioError),
-    /// The scenario at its end cannot be read: a number is not of the kind that its field takes.
+    /// The scenario at the path's end cannot be read: a number is not of the kind that its field takes.
     #[error("at the end of the path, {0}")]
     Unreadable(String),
 }
@@ -101,7 +108,7 @@ named!(impl NoPath {
 });
 
 impl Path {
-    /// A path from a problem to that at the end of a change.
+    /// A path from a problem to the problem at the end of a change.
     ///
     /// # Errors
     ///
@@ -118,8 +125,8 @@ impl Path {
     ///
     /// # Errors
     ///
-    /// [`NoPath`] where there are no others, where the support does not hold all of a pose, and where it may not be held at
-    /// one of them.
+    /// [`NoPath`] if there are no other poses, if the support does not hold all of a pose, or if it may not be held at one
+    /// of the poses.
     pub fn poses(
         problem: &Problem,
         support: usize,
@@ -155,18 +162,27 @@ impl Path {
     }
 
     /// The problem where the path begins.
-    pub fn base(&self) -> &Problem {
+    pub(crate) fn base(&self) -> &Problem {
         &self.base
     }
 
-    /// How far the path goes: 1, or the number of poses after the first.
+    /// Length of the path: 1, or the number of poses after the first.
     pub fn length(&self) -> f64 {
         self.change.length()
     }
 
-    /// What a place on the path is called: the number that changes where there is one, else how far along the path it is.
+    /// The parameter of a place on the path, for reports: the number that changes if there is only one, else the place
+    /// itself.
     pub fn parameter(&self, place: f64) -> f64 {
         self.change.parameter(place)
+    }
+
+    /// The support that moves at a place, if nothing else changes there, with its motion per unit of place, in the units of
+    /// the programme.
+    pub(super) fn support_motion(&self, place: f64) -> Option<(usize, SupportMotion)> {
+        let (support, mut motion) = self.change.support_motion(place)?;
+        motion.translation /= self.base.units().length;
+        Some((support, motion))
     }
 
     /// The problem at a place on the path, or a little before or beyond it; `None` where the scenario there is not valid.
@@ -175,13 +191,25 @@ impl Path {
     }
 }
 
+impl Poses {
+    /// The poses between which a place lies, and its share of the way from one to the other.
+    fn leg(&self, place: f64) -> (&Pose, &Pose, f64) {
+        let leg = (place.max(0.0) as usize).min(self.poses.len() - 2);
+        (&self.poses[leg], &self.poses[leg + 1], place - leg as f64)
+    }
+}
+
 impl Change for Poses {
     fn problem(&self, base: &Problem, place: f64) -> Result<Problem, NoPath> {
-        let leg = (place.max(0.0) as usize).min(self.poses.len() - 2);
-        let [from, to] = [&self.poses[leg], &self.poses[leg + 1]];
-        let pose = self.motion.between(from, to, place - leg as f64);
+        let (from, to, share) = self.leg(place);
+        let pose = self.motion.between(from, to, share);
         let moved = base.with_support_pose(self.support, &pose);
         moved.map_err(NoPath::Invalid)
+    }
+
+    fn support_motion(&self, place: f64) -> Option<(usize, SupportMotion)> {
+        let (from, to, share) = self.leg(place);
+        Some((self.support, self.motion.rate(from, to, share)))
     }
 
     fn length(&self) -> f64 {
@@ -201,6 +229,24 @@ impl Motion {
             Self::Screw => {
                 let screw = (from.inverse() * *to).log().to_vector();
                 *from * Pose::exp(&Twist::from_vector(&(share * screw)))
+            }
+        }
+    }
+
+    /// Rate of the pose by the share.
+    fn rate(self, from: &Pose, to: &Pose, share: f64) -> SupportMotion {
+        match self {
+            Self::Straight => SupportMotion {
+                translation: to.position - from.position,
+                rotation: from.frame * log(&(from.frame.transpose() * to.frame)),
+            },
+            Self::Screw => {
+                let screw = (from.inverse() * *to).log();
+                let frame = self.between(from, to, share).frame;
+                SupportMotion {
+                    translation: frame * screw.translation,
+                    rotation: frame * screw.rotation,
+                }
             }
         }
     }

@@ -1,8 +1,8 @@
-//! Exact derivatives of an equilibrium by what it was solved for: from its factorised first-order conditions.
+//! Exact derivatives of an equilibrium by the data of its problem, from its factorised first-order conditions.
 //!
 //! A solution meets F(x; p) = 0, with x the unknowns and multipliers and p the poses of the supports, the rigidity and so
-//! on. So ∂F/∂x dx = −∂F/∂p dp, where ∂F/∂x is symmetric and is what the last step of the solver factorised. It costs one
-//! back-substitution to carry a change of p to all that it changes, and one to carry a derivative by all that back to p.
+//! on. So ∂F/∂x dx = −∂F/∂p dp, where ∂F/∂x is symmetric and was factorised in the last step of the solver. One
+//! back-substitution carries a change of p to the change of x, and one carries a derivative by x back to p.
 
 mod data;
 mod motion;
@@ -12,6 +12,7 @@ mod system;
 use crate::equilibrium::{Equilibrium, Uncertified};
 use crate::geometry::Wrench;
 use crate::names::named;
+pub(super) use motion::add_support_motion;
 use nalgebra::{Matrix3x6, Vector3};
 use scales::Scales;
 use stagewise::{Response, Singular};
@@ -27,9 +28,9 @@ pub struct Motion {
     pub rotation: Vector3<f64>,
 }
 
-/// A change of what an equilibrium is solved for, in the units of its scenario; or a derivative by that.
+/// A change of the data of an equilibrium's problem, in the units of its scenario; or a derivative by such a change.
 ///
-/// All else is held as it is: mass and rigidity do not go with the width, nor the mesh with anything.
+/// All other data are held fixed: mass and rigidity do not change with the width, and the mesh never changes.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Parameters {
     /// Motion of every support, in the order of the scenario.
@@ -44,7 +45,7 @@ pub struct Parameters {
     pub gravity: Vector3<f64>,
 }
 
-/// A change of an equilibrium, in the units of its scenario; or a derivative by that.
+/// A change of an equilibrium, in the units of its scenario; or a derivative by such a change.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Change {
     /// Displacement of the spine at every node.
@@ -61,7 +62,7 @@ pub struct Change {
     pub energy: f64,
 }
 
-/// Why an equilibrium has no derivatives.
+/// The reason why an equilibrium has no derivatives.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum NoSensitivity {
@@ -73,7 +74,7 @@ pub enum NoSensitivity {
         "the belt can move at no cost of energy, so that its supports do not determine the shape, which has no derivatives"
     )]
     Marginal,
-    /// The smallest change of load may twist it any way.
+    /// The belt is flat under load: the smallest change of load may twist it either way.
     #[error(
         "a part of the loaded belt has stayed flat: how it begins to twist is not smooth, and has no derivatives"
     )]
@@ -159,7 +160,7 @@ impl Sensitivity {
     }
 
     /// No change of any parameter.
-    pub fn no_parameters(&self) -> Parameters {
+    pub(crate) fn no_parameters(&self) -> Parameters {
         Parameters {
             supports: vec![Motion::default(); self.supports()],
             rigidity: vec![0.0; self.nodes],
@@ -169,7 +170,7 @@ impl Sensitivity {
     }
 
     /// No change of the equilibrium.
-    pub fn no_change(&self) -> Change {
+    pub(crate) fn no_change(&self) -> Change {
         let nothing = Vector3::zeros();
         let no_wrench = Wrench {
             force: nothing,
@@ -185,11 +186,11 @@ impl Sensitivity {
         }
     }
 
-    /// What a change of the parameters changes of the equilibrium.
+    /// The change of the equilibrium by a change of the parameters.
     ///
     /// # Errors
     ///
-    /// [`NoSensitivity::NoSlack`] where the supports cannot move so.
+    /// [`NoSensitivity::NoSlack`] where the supports cannot make this motion.
     pub fn forward(&mut self, parameters: &Parameters) -> Result<Change, NoSensitivity> {
         let direction = self.scales.to_program(parameters, &self.system);
         let mut right = self.response.zero();
@@ -217,7 +218,7 @@ impl Sensitivity {
         Ok(change)
     }
 
-    /// Derivative by the parameters of what has these derivatives by the equilibrium: the transpose of
+    /// Derivative by the parameters of a function that has given derivatives by the equilibrium: the transpose of
     /// [`Self::forward`].
     ///
     /// # Errors
@@ -237,7 +238,7 @@ impl Sensitivity {
         for k in 0..self.nodes {
             let force = by.position[k] * units.length;
             self.system
-                .add_pull(k, &force, &by.rotation[k], &mut right.nodes);
+                .add_generalised_force(k, &force, &by.rotation[k], &mut right.nodes);
             right.nodes[k][6] += by.bend[k] / units.length;
             right.nodes[k][7] += by.rib_slope[k];
         }
@@ -278,16 +279,18 @@ impl Sensitivity {
         Ok(jacobian)
     }
 
-    /// Whether nothing moves far under small forces. Where the belt does not bend, the slope of its ribs costs nothing;
-    /// that moves nothing either.
+    /// Whether no node moves far under unit loads, so that no compliance is infinite. Where the belt does not bend, the
+    /// slope of its ribs costs nothing, but moves no node either.
     fn is_held(&mut self) -> bool {
+        /// Displacement under unit loads from which the belt counts as free to move, in U.
         const FAR: f64 = 1e6;
         let mut right = self.response.zero();
         for k in 0..self.nodes {
             let in_general =
                 |seed: f64| Vector3::new(1.0, 2.0, 3.0).map(|i| (i * k as f64 + seed).sin());
             let [force, moment] = [1.0, 2.0].map(|seed| in_general(seed) / self.nodes as f64);
-            self.system.add_pull(k, &force, &moment, &mut right.nodes);
+            self.system
+                .add_generalised_force(k, &force, &moment, &mut right.nodes);
         }
         self.response.solve(&right).is_ok_and(|solution| {
             let motions = (0..self.nodes).map(|k| self.system.motion(k, &solution.nodes));

@@ -1,18 +1,18 @@
-//! Shapes that are the same but for a mirror or for which end is called the start.
+//! Symmetry images: shapes that are the same but for a mirror or for an exchange of start and end.
 
 use crate::geometry::Pose;
 use nalgebra::{Matrix3, Vector3};
 
-/// Largest distance, in U, of nodes of what is still the same.
+/// Distance of nodes up to which two shapes are the same, in U.
 pub(crate) const SAME: f64 = 1e-3;
 
-/// Whether one shape is the other to within a distance of its nodes, in U, moved as a whole, mirrored or not, run through forwards or backwards; both have the same
-/// mesh.
+/// Whether one shape is a symmetry image of the other to within a distance of its nodes, in U: moved as a whole, mirrored or
+/// not, run through forwards or backwards. Both have the same mesh.
 ///
-/// A mirror that takes the belt to itself takes its frame, as columns, from R to Q R S: Q the mirror of space, S that of the
-/// belt, diag(±1, 1, ±1), with the spine left as it is. Run through backwards, S is diag(±1, −1, ±1).
-pub(crate) fn are_twins(a: &[Pose], b: &[Pose], within: f64) -> bool {
-    /// Largest difference of the frames' entries per U.
+/// A mirror that takes the belt to itself takes its frame, as columns, from R to Q R S: Q is the mirror of space, S the
+/// mirror of the belt, diag(±1, 1, ±1), which keeps the spine. Run through backwards, S is diag(±1, −1, ±1).
+pub(crate) fn are_images(a: &[Pose], b: &[Pose], within: f64) -> bool {
+    /// Largest difference of the frames' entries per difference of positions, in 1/U.
     const TURN: f64 = 10.0;
     let seen = in_frame_of_first(a.iter());
     let is_same = |other: &[Pose]| {

@@ -1,9 +1,9 @@
-//! Follows an equilibrium at the rate of a robot while one of its supports moves.
+//! Tracking: an equilibrium is followed at the rate of a robot while one of its supports moves.
 
-use crate::equilibrium::{Equilibrium, Status, Uncertified, is_settled, of_solution, solve_near};
+use crate::equilibrium::{Equilibrium, Status, Uncertified, of_solution, solve_near};
 use crate::geometry::{Pose, Wrench, exp};
 use crate::names::named;
-use crate::problem::program::{BeltPoint, BeltProgram, Piece, rows_of};
+use crate::problem::program::{BeltPoint, BeltProgram, rows_of};
 use crate::problem::{Problem, Units};
 use crate::scenario::error::ScenarioError;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
@@ -11,11 +11,14 @@ use stagewise::{Distance, FollowSettings, Followed, Follower, Residuals};
 use std::ops::ControlFlow;
 use thiserror::Error;
 
-/// Distance in U between equilibria up to which a step downhill is no snap: it is that of a rib bound which passes from one
-/// element to the next.
+/// Distance between equilibria up to which a step downhill is no snap, in U: a rib bound that passes from one element to the
+/// next moves the belt by as much.
 const SMALLEST_JUMP: f64 = 2e-3;
+/// Distance between shapes up to which a change of active edges is no snap, in U: ribs held by another edge move the belt
+/// less.
+const SAME_SHAPE: f64 = 0.01;
 
-/// Why an equilibrium cannot be followed.
+/// The reason why an equilibrium cannot be followed.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum NoTracker {
@@ -42,34 +45,32 @@ named!(impl NoTracker {
     ..Uncertified,
 });
 
-/// What became of a belt as its support moved.
+/// The outcome of a motion of the support.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Update {
-    /// Whether the belt is in equilibrium under the new pose; unless converged, the tracker stays where it was.
+    /// Whether the belt is in equilibrium under the new pose; unless converged, the tracker keeps its last pose.
     pub status: Status,
     /// Whether the equilibrium that was followed ceased to exist or to be stable on the way, or could not be followed, and
-    /// this is another one.
+    /// the belt has snapped to another equilibrium.
     pub snapped: bool,
-    /// Total potential of the shape that the tracker has now.
+    /// Total potential of the tracker's present shape.
     pub energy: f64,
     /// Iterations.
     pub iterations: usize,
-    /// How far the shape is from a solution of its discrete equations.
+    /// Residuals of the shape's discrete equations.
     pub residuals: Residuals,
 }
 
 /// An equilibrium and the support that moves.
 pub struct Tracker {
-    /// What was solved where the tracker began.
+    /// The problem at the tracker's start.
     problem: Problem,
     support: usize,
     follower: Follower<BeltProgram, 6, 2, 8>,
-    /// Where the support is, in the units of the programme.
+    /// Present pose of the support, in the units of the programme.
     pose: Pose,
-    /// What the potential of the programme lacks.
+    /// Difference between the scenario's potential and the programme's, for their origins.
     potential_of_origin: f64,
-    /// Whether ribs of one stretch may reach the edges of another.
-    has_bends: bool,
 }
 
 impl Tracker {
@@ -93,11 +94,6 @@ impl Tracker {
         };
         let follower = Follower::new(solved.program.clone(), settings, &solved.at);
         let follower = follower.ok_or(NoTracker::Marginal)?;
-        let bends = |piece: &Piece| match piece {
-            Piece::Strip(element) => element.geodesic != 0.0,
-            Piece::Joint { angle } => *angle != 0.0,
-            Piece::Rigid { .. } => false,
-        };
         let (units, origin) = (problem.units(), problem.origin());
         let (program, point) = (&solved.program, &solved.at.point);
         let stored = program.elastic_energy(&point.fields) + program.load_potential(&point.poses);
@@ -107,7 +103,6 @@ impl Tracker {
                 frame,
                 position: (position - origin) / units.length,
             },
-            has_bends: solved.program.pieces.iter().any(bends),
             potential_of_origin: equilibrium.energy - stored * units.energy,
             problem,
             follower,
@@ -117,8 +112,8 @@ impl Tracker {
     /// Moves the support to a position and a rotation vector, world axes, and the belt with it.
     ///
     /// Nothing is allocated where the equilibrium is followed and the board has neither links nor bends. `proceed` is asked
-    /// now and then whether to go on; `Break` leaves the tracker where it was. So does a pose that no scenario may hold, which
-    /// is infeasible: one that is not finite, or too many lengths of the belt away.
+    /// during the motion whether to go on; `Break` leaves the tracker at its last pose. So does an infeasible pose, which no
+    /// scenario may hold: a pose that is not finite, or too many lengths of the belt away.
     pub fn update(
         &mut self,
         position: &Vector3<f64>,
@@ -132,7 +127,7 @@ impl Tracker {
         let (from, support) = (self.pose, self.support);
         let held = self.in_scenario(&goal);
         let may_hold = self.problem.check_support_pose(support, &held).is_ok();
-        // A rotation vector that is not finite makes a frame that is.
+        // A rotation vector that is not finite makes a finite frame.
         if !may_hold || rotation.iter().any(|angle| !angle.is_finite()) {
             return self.refused();
         }
@@ -167,7 +162,7 @@ impl Tracker {
         self.take(&found, followed)
     }
 
-    /// What becomes of the belt where its support may not be held: it stays where it was.
+    /// The outcome of a pose at which the support may not be held: the belt keeps its last pose.
     fn refused(&mut self) -> Update {
         Update {
             status: Status::Infeasible,
@@ -178,12 +173,10 @@ impl Tracker {
         }
     }
 
-    /// Takes over what was found where the last equilibrium could not be followed, or reaches edges that it did not before.
+    /// Takes over a found equilibrium where the last equilibrium could not be followed, or its active edges have changed.
     fn take(&mut self, found: &Equilibrium, followed: Followed) -> Update {
-        /// Ribs held by another edge move the belt less.
-        const SAME: f64 = 0.01;
         let solved = found.solved.as_ref();
-        let is_same = |shape: &BeltPoint| shape.distance(self.follower.point()) < SAME;
+        let is_same = |shape: &BeltPoint| shape.distance(self.follower.point()) < SAME_SHAPE;
         let goes_on = followed.arrived && solved.is_some_and(|solved| is_same(&solved.at.point));
         let mut update = Update {
             status: found.status,
@@ -206,12 +199,8 @@ impl Tracker {
     }
 
     fn is_settled(&self) -> bool {
-        !self.has_bends
-            || is_settled(
-                &self.problem,
-                self.follower.program(),
-                self.follower.point(),
-            )
+        let (program, point) = (self.follower.program(), self.follower.point());
+        self.problem.active_set_fault(program, point).is_none()
     }
 
     fn return_to_start(&mut self) {
@@ -232,14 +221,15 @@ impl Tracker {
         }
     }
 
-    /// The problem with the support elsewhere. The programme keeps its origin, also where that is the support that moves.
+    /// The problem with the support at another pose. The programme keeps its origin, even if the origin is the moving
+    /// support.
     fn problem_at(&self, pose: &Pose) -> Result<Problem, ScenarioError> {
         let pose = self.in_scenario(pose);
         let moved = self.problem.with_support_pose(self.support, &pose)?;
         Ok(moved.about(self.problem.origin()))
     }
 
-    /// All that is to be known of the present equilibrium.
+    /// The present equilibrium, with all its data.
     pub fn equilibrium(&mut self) -> Equilibrium {
         let problem = self.problem_at(&self.pose);
         let problem = problem.expect("the pose was checked before the belt was led there");
@@ -278,7 +268,7 @@ impl Tracker {
         self.point().fields.iter().map(|fields| fields[1])
     }
 
-    /// What a support does to the belt.
+    /// The reaction of a support on the belt.
     ///
     /// # Panics
     ///

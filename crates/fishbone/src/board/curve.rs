@@ -4,7 +4,7 @@ use crate::board::flat::FlatFrame;
 use nalgebra::Vector2;
 use std::f64::consts::TAU;
 
-/// An exact piece of an outline.
+/// An exact piece of an outline: a line or an arc.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Curve {
     /// A straight line.
@@ -60,12 +60,12 @@ impl Curve {
     }
 
     /// Last point.
-    pub fn last(&self) -> Vector2<f64> {
+    pub(crate) fn last(&self) -> Vector2<f64> {
         self.point(1.0)
     }
 
     /// The point at a fraction of the length.
-    pub fn point(&self, fraction: f64) -> Vector2<f64> {
+    pub(crate) fn point(&self, fraction: f64) -> Vector2<f64> {
         match self {
             Self::Line { from, to } => match fraction == 1.0 {
                 true => *to,
@@ -80,7 +80,7 @@ impl Curve {
     }
 
     /// Length.
-    pub fn length(&self) -> f64 {
+    pub(crate) fn length(&self) -> f64 {
         match self {
             Self::Line { from, to } => (to - from).norm(),
             Self::Arc { length, .. } => *length,
@@ -90,7 +90,7 @@ impl Curve {
     /// Signed angle by which the direction turns from the first point to the last.
     ///
     /// Units: rad
-    pub fn turn(&self) -> f64 {
+    pub(crate) fn turn(&self) -> f64 {
         match self {
             Self::Line { .. } => 0.0,
             Self::Arc {
@@ -100,7 +100,7 @@ impl Curve {
     }
 
     /// Centre and radius of an arc; `None` of a line.
-    pub fn circle(&self) -> Option<(Vector2<f64>, f64)> {
+    pub(crate) fn circle(&self) -> Option<(Vector2<f64>, f64)> {
         match self {
             Self::Line { .. } => None,
             Self::Arc {
@@ -113,7 +113,7 @@ impl Curve {
     }
 
     /// The part between two fractions of the length.
-    pub fn part(&self, from: f64, to: f64) -> Self {
+    pub(crate) fn part(&self, from: f64, to: f64) -> Self {
         match self {
             Self::Line { .. } => Self::Line {
                 from: self.point(from),
@@ -156,7 +156,7 @@ impl Curve {
     /// ½ ∫ (y dz − z dy): summed around a loop, its area.
     pub(crate) fn swept_area(&self) -> f64 {
         let (turn, length) = (self.turn(), self.length());
-        // (φ − sin φ)/φ², of which the difference leaves no digits for small φ.
+        // (φ − sin φ)/φ² by the coefficients: its difference leaves no digits for small φ.
         let bulge = match turn.abs() < 1e-2 {
             true => turn / 6.0 * (1.0 - turn * turn / 20.0),
             false => (turn - turn.sin()) / (turn * turn),
@@ -206,7 +206,7 @@ impl Curve {
     }
 }
 
-/// A fraction, held to [0, 1] where rounding has pushed it out.
+/// A fraction of a length, clamped to [0, 1] where rounding alone has carried it outside; `None` farther outside.
 fn held(fraction: f64) -> Option<f64> {
     (-1e-9..=1.0 + 1e-9)
         .contains(&fraction)

@@ -1,4 +1,4 @@
-//! The flat board as ribs see it: where they end, and which of them passes a point.
+//! The feet of ribs on the flat board: the ribs' ends, and the rib through a flat point.
 
 use crate::board::flat::{FlatFrame, FlatSpine, Round, direction};
 use crate::board::outline::{Chains, Edge};
@@ -10,14 +10,14 @@ use std::f64::consts::FRAC_PI_2;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Foot {
     pub(crate) point: SpinePoint,
-    /// Its place in the flat board.
+    /// Frame of the foot in the flat board.
     pub(crate) flat: FlatFrame,
-    /// Segment of the chains that it lies on.
+    /// Segment of the chains on which the foot lies.
     owner: usize,
 }
 
 impl Foot {
-    /// How far ahead of a flat point the rib passes, along the spine.
+    /// Distance along the spine by which the rib passes ahead of a flat point.
     pub(crate) fn excess(&self, point: &Vector2<f64>) -> f64 {
         excess(&self.flat, self.point.rib_slope, point)
     }
@@ -33,7 +33,7 @@ fn excess(frame: &FlatFrame, rib_slope: f64, point: &Vector2<f64>) -> f64 {
     -(local.x + local.y * rib_slope)
 }
 
-/// Where a rib leaves the board.
+/// End of a rib: its point on the outline of the board.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct End {
     /// Coordinate v along the rib.
@@ -43,7 +43,7 @@ pub(crate) struct End {
     pub(crate) place: f64,
 }
 
-/// The flat board: outline, nodes, and what is flat of itself.
+/// The flat board: its outline, its nodes, its plates, its period if it is closed.
 #[derive(Debug, Clone)]
 pub(crate) struct Board {
     pub(crate) half_width: f64,
@@ -66,7 +66,7 @@ impl Board {
         }
     }
 
-    /// Flat lengths below this are one point: far above a solver's residuals, far below what is drawn or made.
+    /// Flat length below which two points are one: far above a solver's residuals, far below any drawn or made length.
     pub(crate) fn tolerance(&self) -> f64 {
         2e-6 * self.half_width
     }
@@ -124,7 +124,7 @@ impl Board {
         })
     }
 
-    /// How far inside the edge on one side a flat point lies, in the direction of a rib; `None` beyond the edge's end.
+    /// Depth of a flat point inside the edge on one side, in the direction of a rib; `None` beyond the edge's end.
     pub(crate) fn depth(&self, foot: &Foot, side: usize, point: &Vector2<f64>) -> Option<f64> {
         let window = Window::new(&self.chains, side, foot);
         let end = window.hit(point, self.tolerance())?;
@@ -132,8 +132,8 @@ impl Board {
         Some(outwards.dot(&(end.flat - point)))
     }
 
-    /// The edges of a side behind the one beside a foot, that one if it is there, and those ahead of it; without the
-    /// lines across the ends of the board.
+    /// The edges of a side in three runs: behind the foot, beside the foot (empty where the outline has no edge there),
+    /// ahead of the foot. Lines across the ends of the board are left out.
     pub(crate) fn edges_beside(&self, side: usize, foot: &Foot) -> [&[Edge]; 3] {
         let chain = self.chains.edges[side].as_slice();
         let ends = usize::from(self.chains.is_open);
@@ -176,7 +176,7 @@ impl Board {
         distances
     }
 
-    /// Distance into an element of the rib whose line passes a flat point, if one of the element's does.
+    /// Distance into an element of its rib whose line passes a flat point, if the element has such a rib.
     pub(crate) fn distance_to(
         &self,
         spine: &Spine,
@@ -325,7 +325,8 @@ impl<'a> Window<'a> {
         [a.min(b).max(0.0), a.max(b).min(1.0)]
     }
 
-    /// Where the line of a rib through a flat point meets the edge; where it passes beyond, its nearest approach.
+    /// The point of the edge on the line of a rib through a flat point; where that line passes beyond the edge, its nearest
+    /// approach.
     fn end(&self, point: &Vector2<f64>, tolerance: f64) -> End {
         self.hit(point, tolerance)
             .unwrap_or_else(|| self.graze(point))
@@ -399,7 +400,7 @@ impl<'a> Window<'a> {
         [first, last].into_iter().flatten().find(is_near)
     }
 
-    /// Where the line crosses the window, if it does: on the first piece that ends ahead of it.
+    /// The crossing of the line with the window, if there is one: on the first piece that ends ahead of the line.
     fn on_piece(&self, point: &Vector2<f64>) -> Option<End> {
         let ahead = |index: usize, at: f64| self.ahead(&self.chain[index].curve.point(at), point);
         let &(first, [start, _]) = self.pieces.first()?;
@@ -437,7 +438,8 @@ impl<'a> Window<'a> {
     }
 }
 
-/// The piece of an edge beside a foot, or where it would be, and whether it is there at all.
+/// The index of the piece of an edge beside a foot, and whether the outline has a piece there; if not, the index is the next
+/// piece's.
 fn nearest_piece(chains: &Chains, side: usize, foot: &Foot) -> (usize, bool) {
     let chain = &chains.edges[side];
     let ends = usize::from(chains.is_open);

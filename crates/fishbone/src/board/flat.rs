@@ -1,6 +1,5 @@
 //! The flat spine of the developed board: stretches of one in-plane curvature, and corners between them.
 
-use crate::board::curve::Curve;
 use crate::strip::spine::{Piece, Spine};
 use nalgebra::Vector2;
 
@@ -16,25 +15,25 @@ pub struct FlatFrame {
 }
 
 impl FlatFrame {
-    /// The start of the belt.
-    pub const START: Self = Self {
+    /// Flat frame at the start of the belt, in the belt's unit of length and rad.
+    pub(crate) const START: Self = Self {
         position: Vector2::new(0.0, 0.0),
         heading: 0.0,
     };
 
     /// Unit tangent, η of the flat board.
-    pub fn tangent(&self) -> Vector2<f64> {
+    pub(crate) fn tangent(&self) -> Vector2<f64> {
         direction(self.heading)
     }
 
     /// Unit vector across, ζ of the flat board.
-    pub fn across(&self) -> Vector2<f64> {
+    pub(crate) fn across(&self) -> Vector2<f64> {
         let tangent = self.tangent();
         Vector2::new(-tangent.y, tangent.x)
     }
 
     /// The frame a distance on along an arc of given curvature.
-    pub fn along(&self, curvature: f64, distance: f64) -> Self {
+    pub(crate) fn along(&self, curvature: f64, distance: f64) -> Self {
         let half = 0.5 * curvature * distance;
         let chord = distance * if half == 0.0 { 1.0 } else { half.sin() / half };
         Self {
@@ -44,13 +43,13 @@ impl FlatFrame {
     }
 
     /// Coordinates of a flat point in this frame: along and across.
-    pub fn local(&self, point: &Vector2<f64>) -> Vector2<f64> {
+    pub(crate) fn local(&self, point: &Vector2<f64>) -> Vector2<f64> {
         let offset = point - self.position;
         Vector2::new(self.tangent().dot(&offset), self.across().dot(&offset))
     }
 
     /// The flat point of given coordinates in this frame.
-    pub fn global(&self, local: &Vector2<f64>) -> Vector2<f64> {
+    pub(crate) fn global(&self, local: &Vector2<f64>) -> Vector2<f64> {
         self.position + local.x * self.tangent() + local.y * self.across()
     }
 }
@@ -75,19 +74,12 @@ impl Segment {
     pub(crate) fn end(&self) -> FlatFrame {
         self.start.along(self.geodesic, self.length)
     }
-
-    fn curve(&self) -> Curve {
-        Curve::offset(&self.start, self.geodesic, self.length, 0.0).unwrap_or(Curve::Line {
-            from: self.start.position,
-            to: self.start.position,
-        })
-    }
 }
 
 /// The flat spine, laid out from the start of the belt.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct FlatSpine {
-    /// Its stretches, at least one.
+    /// Stretches in order, at least one.
     pub(crate) segments: Vec<Segment>,
     /// Frame of every node.
     pub(crate) nodes: Vec<FlatFrame>,
@@ -138,7 +130,8 @@ impl FlatSpine {
         });
     }
 
-    /// Adds an element, to the last segment where it goes on alike: positions then come from one start, not from a sum.
+    /// Adds an element: to the last segment if that has the same curvature, for positions to come from one start and not
+    /// from a sum; else as a new segment.
     fn extend(&mut self, geodesic: f64, [from, to]: [f64; 2]) {
         let here = self.end();
         let goes_on =
@@ -158,16 +151,6 @@ impl FlatSpine {
     }
 }
 
-/// The flat spine in exact pieces, from the start of the belt to its end.
-///
-/// # Panics
-///
-/// If the spine has no nodes.
-pub fn flat_spine(spine: &Spine) -> Vec<Curve> {
-    let flat = FlatSpine::of(spine);
-    flat.segments.iter().map(Segment::curve).collect()
-}
-
 /// The flat motion that takes one round of a closed belt to the next, as the belt is unrolled.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Round {
@@ -177,7 +160,7 @@ pub(crate) struct Round {
 }
 
 impl Round {
-    /// `None` of an open belt.
+    /// The motion of a closed belt; `None` of an open belt.
     pub(crate) fn of(spine: &Spine, flat: &FlatSpine) -> Option<Self> {
         let hand = |half_turns: i32| if half_turns % 2 == 0 { 1.0 } else { -1.0 };
         spine.half_turns.map(|half_turns| Self {

@@ -1,8 +1,8 @@
-//! Sheet materials by name, and the bending of laminates of them.
+//! Sheet materials by name, and the bending of laminates.
 
 /// An isotropic material.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Material {
+pub(crate) struct Material {
     /// Young's modulus E. Units: Pa.
     pub young: f64,
     /// Poisson's ratio ν.
@@ -13,16 +13,16 @@ pub struct Material {
 
 /// One layer of a laminate.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Layer {
-    /// What it is made of.
+pub(crate) struct Layer {
+    /// Material of the layer.
     pub material: Material,
     /// Thickness t. Units: m.
     pub thickness: f64,
 }
 
-/// How a stack of bonded layers bends; a single sheet is the stack of one.
+/// Bending data of a stack of bonded layers; a single sheet is a stack of one layer.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Laminate {
+pub(crate) struct Laminate {
     /// Height z₀ of the neutral surface above the bottom. Units: m.
     pub neutral: f64,
     /// Flexural rigidity per width, D₁₁. Units: N·m.
@@ -33,8 +33,9 @@ pub struct Laminate {
     pub mass: Option<f64>,
 }
 
-/// The materials known by name; names are compared without regard to case, spaces, underscores and hyphens.
-pub const PRESETS: [(&str, Material); 7] = [
+/// Materials by name, in the units of [`Material`]; names are compared without regard to case, spaces, underscores and
+/// hyphens.
+pub(crate) const PRESETS: [(&str, Material); 7] = [
     ("polyimide", POLYIMIDE),
     ("rolled-copper", ROLLED_COPPER),
     ("PET", PET),
@@ -44,43 +45,43 @@ pub const PRESETS: [(&str, Material); 7] = [
     ("acrylic-adhesive", ACRYLIC_ADHESIVE),
 ];
 
-/// Polyimide film at 23 °C.
+/// Polyimide film at 23 °C, in the units of [`Material`].
 ///
 /// Source: DuPont, Kapton HN data sheet; Poisson's ratio from the same maker's summary of properties.
-pub const POLYIMIDE: Material = Material::new(2.5e9, 0.34, 1420.0);
+pub(crate) const POLYIMIDE: Material = Material::new(2.5e9, 0.34, 1420.0);
 
-/// Rolled, annealed copper.
+/// Rolled, annealed copper, in the units of [`Material`].
 ///
 /// Rolling texture makes foils softer along some directions than this value for the bulk.
 ///
 /// Source: data sheets of electrolytic tough pitch copper, UNS C11000.
-pub const ROLLED_COPPER: Material = Material::new(117e9, 0.34, 8940.0);
+pub(crate) const ROLLED_COPPER: Material = Material::new(117e9, 0.34, 8940.0);
 
-/// Biaxially oriented polyester film, mean of both directions.
+/// Biaxially oriented polyester film, mean of both directions, in the units of [`Material`].
 ///
 /// Source: DuPont Teijin Films, Mylar bulletin H-37232, type 92A; Poisson's ratio before yield.
-pub const PET: Material = Material::new(4.9e9, 0.38, 1390.0);
+pub(crate) const PET: Material = Material::new(4.9e9, 0.38, 1390.0);
 
-/// General-purpose polystyrene.
+/// General-purpose polystyrene, in the units of [`Material`].
 ///
 /// Source: handbook values, inside the ranges of CRC and Cardarelli, Materials Handbook.
-pub const POLYSTYRENE: Material = Material::new(3.2e9, 0.34, 1050.0);
+pub(crate) const POLYSTYRENE: Material = Material::new(3.2e9, 0.34, 1050.0);
 
-/// Woven glass in epoxy, along the warp; across it, E is about 21 GPa.
+/// Woven glass in epoxy, along the warp, in the units of [`Material`]; across the warp, E is about 21 GPa.
 ///
 /// Source: the commonly tabulated values of NEMA grade FR-4; makers differ by some 10 %.
-pub const FR_4: Material = Material::new(24e9, 0.136, 1850.0);
+pub(crate) const FR_4: Material = Material::new(24e9, 0.136, 1850.0);
 
-/// Austenitic stainless steel, AISI 304.
+/// Austenitic stainless steel, AISI 304, in the units of [`Material`].
 ///
 /// Source: data sheets of AISI 304, UNS S30400.
-pub const STAINLESS_STEEL: Material = Material::new(193e9, 0.29, 8000.0);
+pub(crate) const STAINLESS_STEEL: Material = Material::new(193e9, 0.29, 8000.0);
 
-/// Acrylic bonding sheet of flexible circuits at 23 °C.
+/// Acrylic bonding sheet of flexible circuits at 23 °C, in the units of [`Material`].
 ///
 /// An estimate for a rubber-toughened acrylic: the makers' data sheets give no elastic constants, and they change with
 /// temperature and rate. Give `young` where it matters.
-pub const ACRYLIC_ADHESIVE: Material = Material::new(0.2e9, 0.42, 1200.0);
+pub(crate) const ACRYLIC_ADHESIVE: Material = Material::new(0.2e9, 0.42, 1200.0);
 
 impl Material {
     const fn new(young: f64, poisson: f64, density: f64) -> Self {
@@ -92,7 +93,7 @@ impl Material {
     }
 
     /// The material of a name in [`PRESETS`].
-    pub fn named(name: &str) -> Option<Self> {
+    pub(crate) fn named(name: &str) -> Option<Self> {
         let (_, material) = PRESETS.iter().find(|(known, _)| key(known) == key(name))?;
         Some(*material)
     }
@@ -103,7 +104,7 @@ impl Material {
     }
 }
 
-/// A name as it is compared.
+/// A name in its compared form: lower case, without separators.
 fn key(name: &str) -> String {
     name.chars()
         .filter(|c| !matches!(c, ' ' | '_' | '-'))
@@ -118,7 +119,7 @@ impl Laminate {
     /// ∫(z − z₀)² dz. Of one layer, D₁₁ = E t³/(12 (1 − ν²)).
     ///
     /// Source: classical laminate theory, as in Jones, Mechanics of Composite Materials.
-    pub fn of(layers: &[Layer]) -> Self {
+    pub(crate) fn of(layers: &[Layer]) -> Self {
         let middles = middles(layers);
         let stretch = |layer: &Layer| layer.material.plane_strain() * layer.thickness;
         let moment: f64 = layers
@@ -203,7 +204,7 @@ mod tests {
 
     #[test]
     fn test_two_layers_of_moduli_1_and_3_bend_as_worked_out_by_hand() {
-        // Of thickness 1 each: z₀ = (0.5 + 3·1.5)/4 = 1.25; D₁₁ = 1/12 + 0.75² + 3/12 + 3·0.25² = 13/12.
+        // The layers have thickness 1 each: z₀ = (0.5 + 3·1.5)/4 = 1.25; D₁₁ = 1/12 + 0.75² + 3/12 + 3·0.25² = 13/12.
         let of = |young, poisson: f64| Material {
             young: young * (1.0 - poisson * poisson),
             poisson,

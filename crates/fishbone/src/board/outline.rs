@@ -58,8 +58,8 @@ impl Outline {
 
     /// The outline as polylines for drawing, no chord farther from it than a tolerance.
     ///
-    /// Of an open belt one counter-clockwise loop, its first point repeated at its end; of a closed one the −ζ and
-    /// the +ζ edge.
+    /// An open belt has one counter-clockwise loop, its first point repeated at its end; a closed belt has two lines, the −ζ
+    /// and the +ζ edge.
     pub fn lines(&self, tolerance: f64) -> Vec<Vec<Vector2<f64>>> {
         let [minus, plus] = [&self.minus, &self.plus].map(|edge| polyline(edge, tolerance));
         let Some([start, end]) = self.ends else {
@@ -104,13 +104,13 @@ fn polyline(edge: &[Curve], tolerance: f64) -> Vec<Vector2<f64>> {
     line
 }
 
-/// One piece of an edge, with what is needed to find one's way along it.
+/// One piece of an edge, with its heading and its segment of the spine.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Edge {
     pub(crate) curve: Curve,
     /// Heading of the spine beside its first point; on a free end, the edge's own direction.
     pub(crate) heading: f64,
-    /// Segment of the spine that it belongs to.
+    /// Segment of the spine to which the piece belongs.
     pub(crate) owner: usize,
 }
 
@@ -123,7 +123,7 @@ impl Edge {
         }
     }
 
-    /// Its direction at a fraction of its length, as an angle from the y axis.
+    /// Direction of the edge at a fraction of its length, as an angle from the y axis.
     pub(crate) fn direction(&self, fraction: f64) -> f64 {
         self.heading + fraction * self.curve.turn()
     }
@@ -274,15 +274,15 @@ impl EdgeBuilder<'_> {
     }
 }
 
-/// Where a chain is cut: the pieces on both sides of the cut, and the fractions of their length.
+/// A cut through a chain: the pieces on both sides of the cut, and the fractions of their length.
 struct Cut {
     before: usize,
     after: usize,
     at: [f64; 2],
 }
 
-/// The chain without gaps: at each, the nearest pieces that cross are cut at their crossing, and what is between them
-/// is left out.
+/// The chain without gaps: at each gap the nearest pieces that cross are cut at their crossing, and the pieces between them
+/// are left out.
 fn mended(mut edges: Vec<Edge>, is_open: bool, tolerance: f64) -> Vec<Edge> {
     while !gaps(&edges, tolerance).is_empty() {
         let Some(cut) = nearest_cut(&edges, &gaps(&edges, tolerance), is_open) else {
@@ -342,7 +342,7 @@ fn cuts(edges: &[Edge], [before, after]: [usize; 2], is_open: bool) -> Vec<Cut> 
     crossings.into_iter().map(cut).collect()
 }
 
-/// Closes the gaps that no cut closes by straight lines: such a board folds back onto itself.
+/// Closes the gaps that no cut closes by straight lines: a board with these gaps folds back onto itself.
 fn bridge(edges: &mut Vec<Edge>, tolerance: f64) {
     for gap in gaps(edges, tolerance).into_iter().rev() {
         let (before, after) = (edges[gap], edges[gap + 1]);

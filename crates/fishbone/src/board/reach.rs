@@ -1,20 +1,21 @@
-//! How far ribs reach over the board, and which edges they may end on.
+//! The reach of ribs over the board, and the edges on which they may end.
 
 use crate::board::feet::{Board, Foot};
 use crate::board::flat::direction;
 use crate::board::outline;
-use crate::strip::ribs::{Edge, FURTHER};
+use crate::strip::bounds::{ActiveEdges, Edge};
 use crate::strip::spine::{Piece, Spine};
 use nalgebra::Vector2;
 use std::f64::consts::PI;
 
-/// What rounding does to 1 − s v of ribs that just touch.
+/// Depth of 1 − s v below 0 from which ribs count as crossing, dimensionless: rounding alone moves ribs that just touch by
+/// less.
 const TOUCHING: f64 = 1e-4;
-/// Turn of the outline that is none.
+/// Turn of the outline up to which it counts as straight, in rad.
 const STRAIGHT: f64 = 1e-9;
 
-/// The elements of which ribs cross on the board: that in the middle with its neighbours, or those at both ends with each
-/// other. On a straight board they are left to the bound |s| ≤ 2/V.
+/// The elements whose ribs cross on the board: the rib in the middle of the element with its neighbours, or the ribs at its
+/// two ends with each other. A straight board has none: the bound |s| ≤ 2/V covers its ribs.
 ///
 /// # Panics
 ///
@@ -37,9 +38,10 @@ pub(crate) fn crossings(spine: &Spine) -> Vec<usize> {
     spine.strips().filter(crosses).collect()
 }
 
-/// Whether two ribs cross clearly inside the board: on an arc the bound holds in the middle of an element, and at its
-/// ends only as well as its length allows.
+/// Whether two ribs cross clearly inside the board. On an arc the bound holds in the middle of an element; at its ends it is
+/// missed by a part that grows with the element's length.
 fn cross(board: &Board, feet: [Foot; 2]) -> bool {
+    /// Part of a rib, from the spine towards its end, on which a crossing counts as inside, a share.
     const INSIDE: f64 = 0.95;
     let directions = feet.map(|foot| {
         let along = Vector2::new(-foot.point.rib_slope, 1.0);
@@ -55,14 +57,15 @@ fn cross(board: &Board, feet: [Foot; 2]) -> bool {
         })
 }
 
-/// Of every flexible element the edges before which its ribs must not cross besides |s| ≤ 2/V: where the outline turns
-/// inwards ribs pass the end of their own edge and reach one farther on, on the −ζ or on the +ζ side; of several it is the
-/// one nearest to a crossing. Last the inner edge of its own arc, which very steep ribs may pass by.
+/// The active edges of every flexible element: edges before which its ribs must not cross, in addition to |s| ≤ 2/V. Where
+/// the outline turns inwards ribs pass the end of their own edge and reach an edge farther on, on the −ζ or on the +ζ side;
+/// of several edges in reach the one nearest to a crossing is active. Last comes the inner edge of the element's own arc,
+/// which very steep ribs may pass by.
 ///
 /// # Panics
 ///
 /// If the spine has no nodes.
-pub(crate) fn further_edges(spine: &Spine) -> Vec<(usize, [Option<Edge>; FURTHER])> {
+pub(crate) fn edges_in_reach(spine: &Spine) -> Vec<(usize, ActiveEdges)> {
     let board = Board::of(spine);
     let edges = |element: usize| {
         let rib = MiddleRib {
@@ -93,7 +96,7 @@ struct MiddleRib {
     length: f64,
 }
 
-/// Which way edges are followed: on the −ζ or the +ζ side, behind or ahead of the foot, as signs.
+/// The direction in which edges are followed, as two signs: the −ζ or the +ζ side, behind or ahead of the foot.
 #[derive(Clone, Copy)]
 struct Way {
     side: f64,
@@ -101,7 +104,7 @@ struct Way {
 }
 
 impl MiddleRib {
-    /// Of the edges ahead and behind that it may reach, the one at which it is nearest to a crossing.
+    /// The edge in reach, ahead or behind, at which the rib is nearest to a crossing.
     fn nearest_edge(&self, board: &Board, side: usize) -> Option<Edge> {
         let [behind, own, ahead] = board.edges_beside(side, &self.foot);
         let side = sign(side);
@@ -148,7 +151,7 @@ impl MiddleRib {
         run
     }
 
-    /// Direction of an edge at a fraction of its length, from that of the spine at the foot.
+    /// Direction of an edge at a fraction of its length, from the direction of the spine at the foot.
     fn direction(&self, edge: &outline::Edge, fraction: f64) -> f64 {
         edge.direction(fraction) - self.foot.flat.heading
     }
@@ -175,7 +178,7 @@ impl MiddleRib {
                 let direction = direction(self.direction(edge, near));
                 let point = self.foot.flat.local(&edge.curve.point(near));
                 let distance = direction.perp(&point);
-                // Along the element the distance grows or falls, and 1 − s v stays what it is.
+                // Along the element the distance grows or falls, and 1 − s v is constant.
                 let farthest = side * distance + 0.5 * self.length * direction.y.abs();
                 (farthest > 0.0).then(|| Edge::line(direction, distance))
             }
@@ -195,6 +198,7 @@ mod tests {
     use approx::assert_relative_eq;
     use proptest::prelude::*;
 
+    /// Width of the test boards, in U.
     const WIDTH: f64 = 0.1;
 
     fn ell(angle: f64) -> Spine {
@@ -207,7 +211,7 @@ mod tests {
         for angle in [0.4f64, 1.0, 1.5] {
             let spine = ell(angle);
             let mut seen = 0;
-            for (element, [minus, plus, own]) in further_edges(&spine) {
+            for (element, [minus, plus, own]) in edges_in_reach(&spine) {
                 assert_eq!((minus, own), (None, None));
                 let Some(edge) = plus else { continue };
                 let ahead = 0.5 - 0.5 * (spine.u[element] + spine.u[element + 1]);
@@ -267,17 +271,17 @@ mod tests {
                 let edge = board.chains.edges[side][end.place as usize];
                 let missed = (edge.curve.point(end.place.fract()) - end.flat).norm();
                 let u = 0.5 * (spine.u[element] + spine.u[element + 1]);
-                // Ribs that may leave through an end line, and those that pass by all edges of their side.
+                // Left out: ribs that may leave through an end line, and ribs that pass by all edges of their side.
                 if u < 0.2 || u > spine.length() - 0.2 || missed > 1e-6 {
                     continue;
                 }
                 let rib = MiddleRib { foot, convergence: 1.0 / v, length: 0.0 };
                 let slope = rib.foot.point.rib_slope;
                 let edges = [rib.nearest_edge(&board, side), rib.own_arc(&board, side)];
-                let further = edges.into_iter().flatten().map(|edge| edge.slack(slope, 1.0 / v));
+                let active = edges.into_iter().flatten().map(|edge| edge.slack(slope, 1.0 / v));
                 let geodesic = spine.pieces[element].geodesic();
                 let own = (geodesic == 0.0).then(|| 1.0 - 0.5 * WIDTH / v.abs());
-                let least = further.chain(own).fold(f64::INFINITY, f64::min);
+                let least = active.chain(own).fold(f64::INFINITY, f64::min);
                 prop_assert!(least.abs() < 1e-4, "{element} {u} {v} {slope} {least}");
             }
         }

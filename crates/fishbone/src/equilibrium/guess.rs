@@ -1,18 +1,40 @@
-//! Where the search for an equilibrium starts: an arch on the side of the bulge, with ribs that do not cross.
+//! Starts of the search for an equilibrium: an arch on the side of the bulge, with ribs that do not cross.
+
+mod headings;
+mod ribs;
 
 use crate::geometry::{Pose, exp, log};
-use crate::problem::program::{BeltPoint, BeltProgram, NodeSupport, Piece};
+use crate::problem::program::{BeltPoint, BeltProgram, NodeSupport};
+use headings::Headings;
 use nalgebra::{Matrix3, UnitQuaternion, Vector2, Vector3};
+use ribs::calm_slopes;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-/// Samples of the arch when its reach is measured.
+/// Samples of the arch along which its reach is integrated, a number.
 const SAMPLES: usize = 24;
-/// What a miss by the whole length counts for when arches are compared, as ∫ω_ζ² du: a tenth of it as much as a turn.
+/// Cost of a miss by the whole length against the arch's energy ∫ω_ζ² du, in rad²/U: a miss by a tenth costs as much
+/// as a turn.
 const MISS: f64 = 10.0 * TAU * TAU;
-/// What bulging straight to the side asked for counts for.
+/// Gain of a bulge straight to the side asked for against the arch's energy ∫ω_ζ² du, in rad²/U.
 const BULGE: f64 = 100.0;
-/// Height of the arch at which its ends meet, the largest of any use.
+/// Amplitude of the arch at which its ends meet, the greatest of any use, in rad.
 const HIGHEST: f64 = 2.4;
+/// Values of the amplitude from which the best is refined, a number.
+const AMPLITUDES: usize = 24;
+/// Width of the interval at which the refinement of the amplitude ends, as a share of the amplitude.
+const NARROW: f64 = 1e-3;
+/// Width of the interval at which the refinement of a vanishing amplitude ends, in rad.
+const NARROWEST: f64 = 1e-7;
+/// Miss of the supports by which one side of a ring must be the better to be preferred, lengths in U and angles in rad.
+const NEARER: f64 = 1e-6;
+/// Bend up to which a node counts as flat, in rad/U.
+const FLAT: f64 = 1e-6;
+/// Bend given to a flat belt that may buckle, in rad/U.
+const BUCKLED_BEND: f64 = 1.0;
+/// Part of the way from rib slopes far from crossing to a shape's own rib slopes that is tried first, a share.
+const INTERIOR: f64 = 0.999;
+/// Greatest count of halvings of this part, until the ribs do not cross, a number.
+const HALVINGS: usize = 12;
 
 /// A plane arch as the angle its tangent has turned about ζ, by u in U.
 #[derive(Debug, Clone, Copy)]
@@ -60,8 +82,8 @@ impl Arch {
     }
 }
 
-/// A start for the search: the arch whose reach comes nearest to what the supports at the two ends ask for, bulging to
-/// the side of `bulge`, with ribs that do not cross.
+/// A start for the search: the arch whose reach is nearest to the pose of the end that the supports at the two ends
+/// prescribe, bulging to the side of `bulge`, with ribs that do not cross.
 pub(crate) fn guess(program: &BeltProgram, bulge: &Vector3<f64>) -> BeltPoint {
     let last = program.pieces.len();
     let at = |node: usize| program.supports.iter().find(|s| s.node == node);
@@ -74,10 +96,9 @@ pub(crate) fn guess(program: &BeltProgram, bulge: &Vector3<f64>) -> BeltPoint {
     point
 }
 
-/// The start for a closed belt before it is twisted: a ring or, of a curved board, a cone; to the side where it comes nearer
-/// to its supports, else to that to which it curls of itself, else to that of the bulge.
+/// The start for a closed belt before it is twisted: a ring or, of a curved board, a cone; on the side where it is nearer to
+/// its supports, else the side of its natural bend, else the side of the bulge.
 pub(crate) fn ring(program: &BeltProgram, bulge: &Vector3<f64>) -> BeltPoint {
-    const NEARER: f64 = 1e-6;
     let start = program.supports.first();
     let frame = start_frame(program, start, None, bulge);
     let curl: f64 = program
@@ -127,156 +148,7 @@ fn arched(program: &BeltProgram, arch: &Arch, slopes: &[f64], frame: &Matrix3<f6
     point
 }
 
-/// Rib slopes far from crossing, square where they are held so: the best of those in which the ribs turn with the spine,
-/// but more gently, over as many widths as it takes.
-///
-/// Parallel ribs never cross, whatever the spine does; ribs square to the spine cross at every bend of the board.
-pub(crate) fn calm_slopes(program: &BeltProgram) -> Vec<f64> {
-    const WIDTHS: [f64; 7] = [0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0];
-    const CALM: f64 = 0.3;
-    let board = Headings::of(program);
-    let width = program
-        .elements()
-        .map(|(_, element)| 2.0 * element.half_width)
-        .fold(0.0, f64::max);
-    let mut best = (f64::NEG_INFINITY, vec![0.0; board.u.len()]);
-    let smooth = WIDTHS.iter().map(|widths| board.slopes(widths * width));
-    let mitred = WIDTHS
-        .iter()
-        .map(|widths| mitred_slopes(program, widths * width));
-    for slopes in smooth.chain(mitred) {
-        let mut point = BeltPoint {
-            fields: slopes
-                .iter()
-                .map(|slope| Vector2::new(0.0, *slope))
-                .collect(),
-            poses: vec![Pose::identity(); slopes.len()],
-        };
-        program.settle(&mut point);
-        let slack = program.least_slack(&point);
-        if slack > best.0 {
-            best = (slack, point.fields.iter().map(|fields| fields[1]).collect());
-        }
-        if best.0 >= CALM {
-            break;
-        }
-    }
-    best.1
-}
-
-/// Rib slopes along the mitre at every bend, square where held so, linear in between and square beyond a reach of both.
-fn mitred_slopes(program: &BeltProgram, reach: f64) -> Vec<f64> {
-    let u = program.nodes();
-    let mut anchors: Vec<(f64, f64)> = Vec::new();
-    let mut anchor = |u: f64, slope: f64| {
-        if let Some((before, _)) = anchors.last().copied()
-            && u - before > 2.0 * reach
-        {
-            anchors.extend([(before + reach, 0.0), (u - reach, 0.0)]);
-        }
-        anchors.push((u, slope));
-    };
-    anchor(u[0], 0.0);
-    for (k, piece) in program.pieces.iter().enumerate() {
-        let mitre = match piece {
-            Piece::Joint { angle } => (0.5 * angle).tan(),
-            Piece::Strip(_) | Piece::Rigid { .. } => 0.0,
-        };
-        if mitre != 0.0 || program.fixed_slope(k).is_some() {
-            anchor(u[k], program.fixed_slope(k).unwrap_or(mitre));
-        }
-        if mitre != 0.0 {
-            anchor(u[k + 1], program.fixed_slope(k + 1).unwrap_or(-mitre));
-        }
-    }
-    anchor(u[u.len() - 1], 0.0);
-    let at = |(node, u): (usize, &f64)| {
-        let after_joint = node > 0 && matches!(program.pieces[node - 1], Piece::Joint { .. });
-        let next = anchors.partition_point(|(place, _)| place < u || (after_joint && place == u));
-        let next = next.clamp(1, anchors.len() - 1);
-        let ((a, left), (b, right)) = (anchors[next - 1], anchors[next]);
-        let share = if b > a { (u - a) / (b - a) } else { 1.0 };
-        left + share.clamp(0.0, 1.0) * (right - left)
-    };
-    u.iter().enumerate().map(at).collect()
-}
-
-/// Which way the spine of the flat board heads.
-struct Headings {
-    u: Vec<f64>,
-    /// Angle from η at the start towards ζ, at every node.
-    heading: Vec<f64>,
-    /// Its integral from the start.
-    integral: Vec<f64>,
-    /// Arc lengths where the rib is held.
-    held: Vec<f64>,
-}
-
-impl Headings {
-    fn of(program: &BeltProgram) -> Self {
-        let u = program.nodes();
-        let (mut heading, mut integral) = (vec![0.0], vec![0.0]);
-        for (k, piece) in program.pieces.iter().enumerate() {
-            let turn = match piece {
-                Piece::Strip(element) => element.geodesic * element.length,
-                Piece::Joint { angle } => *angle,
-                Piece::Rigid { .. } => 0.0,
-            };
-            integral.push(integral[k] + piece.length() * (heading[k] + 0.5 * turn));
-            heading.push(heading[k] + turn);
-        }
-        let held = (0..u.len()).filter(|node| program.fixed_slope(*node).is_some());
-        Self {
-            held: held.map(|node| u[node]).collect(),
-            heading,
-            integral,
-            u,
-        }
-    }
-
-    /// Rib slopes of which the flat direction is the mean heading within a reach on either side, less near held ribs.
-    fn slopes(&self, reach: f64) -> Vec<f64> {
-        const SHORTEST: f64 = 1e-6;
-        let slope = |(u, heading): (&f64, &f64)| {
-            let reach = reach.max(SHORTEST).min(self.to_held(*u));
-            let mean = (self.integral_at(u + reach) - self.integral_at(u - reach)) / (2.0 * reach);
-            match reach < SHORTEST {
-                true => 0.0,
-                false => (mean - heading).clamp(-1.5, 1.5).tan(),
-            }
-        };
-        self.u.iter().zip(&self.heading).map(slope).collect()
-    }
-
-    /// Way to the nearest held rib.
-    fn to_held(&self, u: f64) -> f64 {
-        let ways = self.held.iter().map(|held| (held - u).abs());
-        ways.fold(f64::INFINITY, f64::min)
-    }
-
-    /// Integral of the heading from the start, going on straight beyond the ends.
-    fn integral_at(&self, u: f64) -> f64 {
-        let last = self.u.len() - 1;
-        let k = self.u.partition_point(|node| *node <= u);
-        if k == 0 {
-            return u * self.heading[0];
-        }
-        let past = u - self.u[k - 1];
-        if k > last {
-            return self.integral[last] + past * self.heading[last];
-        }
-        let length = self.u[k] - self.u[k - 1];
-        let rise = self.heading[k] - self.heading[k - 1];
-        self.integral[k - 1] + past * (self.heading[k - 1] + 0.5 * rise * past / length)
-    }
-
-    /// Whether the board is straight all along.
-    fn is_straight(&self) -> bool {
-        self.heading.iter().all(|heading| *heading == 0.0)
-    }
-}
-
-/// Disturbs a start or a saddle out of its symmetry by a smooth twist and a sway, `share` of what the rib bound allows.
+/// Disturbs a start or a saddle out of its symmetry by a smooth twist and a sway, by a `share` of the rib bound.
 pub(crate) fn disturb(program: &BeltProgram, point: &BeltPoint, share: f64) -> BeltPoint {
     let steepest = PI * (1.0 + 2.0 * 0.7);
     let bound = program
@@ -295,7 +167,7 @@ pub(crate) fn disturb(program: &BeltProgram, point: &BeltPoint, share: f64) -> B
     inside(program, disturbed)
 }
 
-/// A belt with a share of its own bend kept and bend and slope added by u in U, its ribs brought back to where they do not cross.
+/// A belt with a share of its own bend kept, bend and slope added by u in U, and ribs brought back until they do not cross.
 pub(crate) fn waved(
     program: &BeltProgram,
     base: &BeltPoint,
@@ -310,16 +182,16 @@ pub(crate) fn waved(
     inside(program, waved)
 }
 
-/// Whether a belt is not bent at a node.
+/// Whether a belt is flat at a node.
 pub(crate) fn is_flat(fields: &Vector2<f64>) -> bool {
-    const FLAT: f64 = 1e-6;
     fields[0].abs() <= FLAT
 }
 
-/// A belt bent where it is flat, with ribs all sloping one way: what a load may buckle it into. With no waves it is bent to
-/// the side of the bulge, most at the start, as a cantilever; with some to and fro, as between clamps.
+/// A belt bent where it is flat, with ribs all sloping one way, near a shape into which a load may buckle it. With no waves
+/// the belt is bent to the side of the bulge, most at the start, as a cantilever; with waves it is bent to and fro, as
+/// between clamps.
 ///
-/// In the flat state every slope of the ribs is as good as any other, so that small disturbances do not tell.
+/// In the flat state every slope of the ribs costs the same, so that small disturbances do not decide.
 pub(crate) fn buckle(
     program: &BeltProgram,
     point: &BeltPoint,
@@ -327,7 +199,6 @@ pub(crate) fn buckle(
     waves: f64,
     bulge: &Vector3<f64>,
 ) -> BeltPoint {
-    const BEND: f64 = 1.0;
     let side = -point.poses[0].frame.column(0).dot(bulge).signum();
     let mut buckled = point.clone();
     let calm = calm_slopes(program);
@@ -343,19 +214,17 @@ pub(crate) fn buckle(
                 true => 1.0 - u,
                 false => 4.0 * (TAU * waves * u).cos(),
             };
-            *fields = Vector2::new(side * BEND * bend, calm + slope.clamp(-most, most));
+            *fields = Vector2::new(side * BUCKLED_BEND * bend, calm + slope.clamp(-most, most));
         }
     }
     inside(program, buckled)
 }
 
-/// The same shape with its ribs a little off the bound, where a barrier can start.
+/// A shape with its ribs a little off the bound, where a barrier can start.
 pub(crate) fn inside(program: &BeltProgram, mut point: BeltPoint) -> BeltPoint {
-    const OFF: f64 = 0.999;
-    const HALVINGS: usize = 12;
     let calm = calm_slopes(program);
     let wild: Vec<f64> = point.fields.iter().map(|fields| fields[1]).collect();
-    let mut share = OFF;
+    let mut share = INTERIOR;
     for _ in 0..HALVINGS {
         for ((fields, calm), wild) in point.fields.iter_mut().zip(&calm).zip(&wild) {
             fields[1] = calm + share * (wild - calm);
@@ -369,8 +238,8 @@ pub(crate) fn inside(program: &BeltProgram, mut point: BeltPoint) -> BeltPoint {
     point
 }
 
-/// Frame at u = 0: as held there, else such that the flat board ends as held there, else along the chord with the normal
-/// toward the bulge.
+/// Frame at u = 0: the frame held there; else the frame from which the flat board ends in the frame held at u = U; else
+/// along the chord with the normal toward the bulge.
 fn start_frame(
     program: &BeltProgram,
     start: Option<&NodeSupport>,
@@ -407,13 +276,13 @@ fn frame_along(along: &Vector3<f64>, toward: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::from_columns(&[normal, tangent, normal.cross(&tangent)])
 }
 
-/// From the start's position to the end's, where both are held.
+/// Chord from the start's position to the end's; `None` unless both are held.
 fn chord(start: Option<&NodeSupport>, end: Option<&NodeSupport>) -> Option<Vector3<f64>> {
     Some(end?.point()? - start?.point()?)
 }
 
-/// The arch whose reach is nearest to the chord, on the side of the bulge. Where the belt turns so far that no side is that
-/// of the bulge, and where the end's frame may be reached either way round, it is the least bent.
+/// The arch whose reach is nearest to the chord, on the side of the bulge. If the belt turns so far that neither side is the
+/// bulge's, or the end's frame may be reached either way round, the arch is the least bent of the candidates.
 fn fit_arch(
     program: &BeltProgram,
     slopes: &[f64],
@@ -439,7 +308,7 @@ fn fit_arch(
                 frame.tr_mul(&poses.last().map_or(Vector3::zeros(), |pose| pose.position))
             }
         };
-        // Not squared: on a nearly taut belt the miss is itself a square of the height.
+        // The miss is not squared: near the inextensible limit it is itself a square of the height.
         match held(start).is_some() {
             true => (reach - frame.tr_mul(&chord)).norm(),
             false => (reach.norm() - chord.norm()).abs(),
@@ -484,15 +353,11 @@ fn ways_round(rotation: &UnitQuaternion<f64>) -> Vec<Vector3<f64>> {
     }
 }
 
-/// Where a function of [0, `most`] is least: the best of a grid, then a golden-section search around it, to a thousandth of
-/// itself.
+/// The minimiser of a function of [0, `most`]: the best of a grid, then a golden-section search around it.
 fn least(most: f64, f: impl Fn(f64) -> f64) -> f64 {
-    const GRID: usize = 24;
-    const NARROW: f64 = 1e-3;
-    const LEAST: f64 = 1e-7;
-    let step = most / GRID as f64;
+    let step = most / AMPLITUDES as f64;
     let (mut best, mut value) = (0.0, f64::INFINITY);
-    for k in 0..=GRID {
+    for k in 0..=AMPLITUDES {
         let here = f(k as f64 * step);
         if here < value {
             (best, value) = (k as f64 * step, here);
@@ -503,7 +368,7 @@ fn least(most: f64, f: impl Fn(f64) -> f64) -> f64 {
     let inner = |low: f64, high: f64| [high - ratio * (high - low), low + ratio * (high - low)];
     let [mut left, mut right] = inner(low, high);
     let (mut at_left, mut at_right) = (f(left), f(right));
-    while high - low > NARROW * high + LEAST {
+    while high - low > NARROW * high + NARROWEST {
         if at_left <= at_right {
             high = right;
             (right, at_right) = (left, at_left);
@@ -519,7 +384,7 @@ fn least(most: f64, f: impl Fn(f64) -> f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// Moves the whole belt so that the start, or else the end, is where it is held.
+/// Moves the whole belt so that the start, or else the end, is at its held position.
 fn place(point: &mut BeltPoint, start: Option<&NodeSupport>, end: Option<&NodeSupport>) {
     let from_end = || Some(end?.point()? - point.poses.last()?.position);
     let shift = start
@@ -535,9 +400,10 @@ fn place(point: &mut BeltPoint, start: Option<&NodeSupport>, end: Option<&NodeSu
 mod tests {
     use super::*;
     use crate::problem::program::Hold;
-    use crate::strip::developable::{Curl, EnergyModel};
+    use crate::problem::program::Piece;
+    use crate::strip::developable::EnergyModel;
+    use crate::strip::element::Curl;
     use crate::strip::element::Element;
-    use crate::strip::ribs::FURTHER;
 
     fn held(node: usize, position: [f64; 3], rotation: Option<[f64; 3]>) -> NodeSupport {
         NodeSupport {
@@ -557,7 +423,6 @@ mod tests {
             rigidity: [1.0; 2],
             half_width: 0.05,
             curl: Curl::default(),
-            further: [None; FURTHER],
         };
         BeltProgram::new(vec![Piece::Strip(element); 40], EnergyModel::Wunderlich)
             .with_supports(supports)
@@ -642,7 +507,6 @@ mod tests {
                 rigidity: [1.0; 2],
                 half_width: 0.05,
                 curl: Curl::default(),
-                further: [None; FURTHER],
             };
             pieces.extend([Piece::Strip(element); 40]);
         }

@@ -1,7 +1,7 @@
 //! The intrinsic method: the interior-point search in the two fields bend and rib slope.
 
-use super::apart::{keep_apart, unsettled};
-use super::search::{CLOSE, COLD, Search, is_flat_under_load};
+use super::active_set::settle;
+use super::search::{MinimumSettings, Search, is_flat_under_load};
 use super::stability::Stability;
 use super::{Equilibrium, LinkForce, Reaction, Solved, Start, Status};
 use crate::equilibrium::guess::{disturb, guess};
@@ -13,9 +13,9 @@ use nalgebra::Vector3;
 use stagewise::{Inertia, Outcome, Solution, redundant_equalities};
 use std::ops::ControlFlow;
 
-/// Residual of the constraints, lengths in U and angles in rad, above which they are missed and not only rounded.
+/// Residual of the constraints above which they are missed beyond rounding, lengths in U and angles in rad.
 const CLEARLY_MISSED: f64 = 1e-6;
-/// Why a search does not begin.
+/// Message of a search that cannot begin, for people.
 const CROSSING: &str = "no ribs found that do not cross: the bends, arcs and square ribs of the board are too close together \
                         for its width; make it narrower or the segments longer";
 
@@ -33,31 +33,30 @@ pub(super) fn solve(
             None,
         ),
         None => {
-            let (found, crossing) = find(problem, from, proceed);
+            let (found, fault) = find(problem, from, proceed);
             let redundant = redundant(problem, &found.program);
-            let (status, message) = judge(problem, &found.solution, crossing, redundant.as_deref());
+            let (status, message) = judge(problem, &found.solution, fault, redundant.as_deref());
             (found, status, message, redundant)
         }
     };
     equilibrium(problem, found, status, message, redundant)
 }
 
-/// The equilibrium of a solution of a problem's programme that was found by other means; it has converged only where its
-/// ribs are apart.
+/// The equilibrium of a solution of a problem's programme that was found by other means; it has converged only if the
+/// programme's active sets are right for it.
 pub(crate) fn of_solution(
     problem: &Problem,
     program: BeltProgram,
     solution: Solution<BeltPoint>,
 ) -> Equilibrium {
     let redundant = redundant(problem, &program);
-    let spine = problem.spine(&program, &solution.at.point);
-    let crossing = unsettled(&program, &spine).map(|element| spine.u[element]);
-    let (status, message) = judge(problem, &solution, crossing, redundant.as_deref());
+    let fault = problem.active_set_fault(&program, &solution.at.point);
+    let (status, message) = judge(problem, &solution, fault, redundant.as_deref());
     let found = Found { program, solution };
     equilibrium(problem, found, status, message, redundant)
 }
 
-/// All that is to be known of where a search ended.
+/// The equilibrium at which a search ended, with all its data.
 fn equilibrium(
     problem: &Problem,
     Found { program, solution }: Found,
@@ -113,7 +112,7 @@ fn equilibrium(
     }
 }
 
-/// Where a search ended, in its programme.
+/// The end of a search: the programme and its solution.
 struct Found {
     program: BeltProgram,
     solution: Solution<BeltPoint>,
@@ -124,6 +123,7 @@ impl Search {
         Self {
             bulge: problem.bulge(),
             tolerance: problem.tolerance(),
+            settings: MinimumSettings::default(),
         }
     }
 }
@@ -135,31 +135,31 @@ fn start(problem: &Problem) -> Found {
     Found { program, solution }
 }
 
-/// Searches; with the arc length where ribs still cross on the board, if they do.
+/// The end of a search, with the fault of the active sets of the shape found, if there is one.
 fn find(
     problem: &Problem,
     from: Start,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
-) -> (Found, Option<f64>) {
+) -> (Found, Option<String>) {
     let search = Search::of(problem);
+    let MinimumSettings {
+        cold_barrier,
+        close_barrier,
+        ..
+    } = search.settings;
     let mut program = problem.program(problem.elements());
     let solution = match from {
         Start::Near(shape) => search.from(&program, shape.clone(), proceed),
-        Start::Shape(shape) => search.only_from(&program, shape.clone(), COLD, proceed),
-        Start::Close(shape) => search.only_from(&program, shape.clone(), CLOSE, proceed),
+        Start::Shape(shape) => search.only_from(&program, shape.clone(), cold_barrier, proceed),
+        Start::Close(shape) => search.only_from(&program, shape.clone(), close_barrier, proceed),
         Start::Guess => {
             let default = problem.scenario().default_elements();
             let coarse = (problem.elements() > default).then(|| problem.program(default));
             search.run(&program, coarse.as_ref(), proceed)
         }
     };
-    let (solution, crossing) = keep_apart(problem, &search, &mut program, solution, proceed);
-    (Found { program, solution }, crossing)
-}
-
-/// Whether the ribs of a shape are apart on the whole board, and bounded by no edge that they do not reach.
-pub(crate) fn is_settled(problem: &Problem, program: &BeltProgram, point: &BeltPoint) -> bool {
-    unsettled(program, &problem.spine(program, point)).is_none()
+    let (solution, fault) = settle(problem, &search, &mut program, solution, proceed);
+    (Found { program, solution }, fault)
 }
 
 /// The supports and links whose constraints are redundant, by name; `None` where all are independent.
@@ -175,7 +175,7 @@ fn redundant(problem: &Problem, program: &BeltProgram) -> Option<String> {
     if supports <= 2 && links == 0 && !rigid {
         return None;
     }
-    // In general position: some constraints depend on each other on the straight belt and nowhere else.
+    // The shape is in general position: some constraints depend on each other on the straight belt and nowhere else.
     let general = disturb(program, &guess(program, &problem.bulge()), 0.3);
     let name = |i: usize| match i.checked_sub(program.supports.len()) {
         None if i < supports => Some(format!("supports[{i}]")),
@@ -193,21 +193,14 @@ fn redundant(problem: &Problem, program: &BeltProgram) -> Option<String> {
 fn judge(
     problem: &Problem,
     solution: &Solution<BeltPoint>,
-    crossing: Option<f64>,
+    fault: Option<String>,
     redundant: Option<&str>,
 ) -> (Status, String) {
     let tolerance = problem.tolerance();
     let largest = solution.residuals.largest();
     let (iterations, violation) = (solution.iterations, solution.residuals.constraint);
     match solution.outcome {
-        Outcome::Converged if let Some(u) = crossing => (
-            Status::NotConverged,
-            format!(
-                "ribs beside a bend, at u = {}, could not be kept apart on the board; try another solver.bulge, a \
-                 narrower board or a gentler bend",
-                number(u)
-            ),
-        ),
+        Outcome::Converged if let Some(fault) = fault => (Status::NotConverged, fault),
         Outcome::Converged => (
             Status::Converged,
             format!("converged in {iterations} iterations, largest residual {largest:.1e}"),
@@ -260,23 +253,23 @@ fn judge(
     }
 }
 
-/// What should be known of redundant constraints before the reactions are relied on.
+/// The warning of redundant constraints, which leave reactions undetermined.
 fn doubts(status: Status, redundant: Option<&str>) -> Vec<String> {
     let names = redundant.filter(|_| status == Status::Converged);
-    let said = names.map(|names| {
+    let warning = names.map(|names| {
         format!("{names} hold the same twice over: what each of them bears is not determined")
     });
-    said.into_iter().collect()
+    warning.into_iter().collect()
 }
 
-/// Says where a closed belt ended with another number of half turns than it was given.
+/// The warning of a closed belt that ended with another number of half turns than it was given.
 fn passed_through_itself(scenario: &Scenario, half_turns: Option<i32>) -> Vec<String> {
     let asked = scenario.belt.half_turns.unwrap_or(0);
     let made = half_turns.filter(|made| *made != asked);
-    let said = made.map(|made| {
+    let warning = made.map(|made| {
         format!("the belt has passed through itself: it was given {asked} half turns and ended with {made}")
     });
-    said.into_iter().collect()
+    warning.into_iter().collect()
 }
 
 fn warnings(
@@ -286,8 +279,10 @@ fn warnings(
     stability: Option<Stability>,
     is_flat: bool,
 ) -> Vec<String> {
-    // Strong twist makes facets of the scale of V, which longer elements cannot resolve.
+    /// Elements for each width V that are safe, a number: strong twist makes facets of the scale of V, which longer elements
+    /// cannot resolve.
     const SAFE: f64 = 8.0;
+    /// Thickness from which a belt is no thin strip, in V.
     const THICK: f64 = 0.25;
     let scenario = problem.scenario();
     let shares = program
@@ -338,7 +333,7 @@ fn warnings(
     .collect()
 }
 
-/// Says where an orientation is given by more than a turn, as degrees would be.
+/// The warning of an orientation given by more than a turn, as degrees would be.
 fn more_than_a_turn((i, support): (usize, &SupportSpec)) -> Option<String> {
     let angles = support.rotation.or(support.euler)?;
     let largest = angles
@@ -349,13 +344,15 @@ fn more_than_a_turn((i, support): (usize, &SupportSpec)) -> Option<String> {
     })
 }
 
-/// Where a part of the belt is flat, any slope of its ribs is as good as any other; under stress, which of them the belt may
-/// give way along is not seen in the second variation with these held, unless it is negative already.
+/// Stability by the second variation; `None` where it is undecided. Where a part of the belt is flat, every slope of its
+/// ribs costs the same. Under stress the second variation with these slopes held does not show whether the belt is unstable
+/// with other slopes, unless it is negative already.
 fn stability(
     status: Status,
     inertia: Option<Inertia>,
     internal: &[(Vector3<f64>, Vector3<f64>)],
 ) -> Option<Stability> {
+    /// Internal force and moment up to which a belt counts as unstressed, in mean R_f/U² and mean R_f/U.
     const UNSTRESSED: f64 = 1e-6;
     let inertia = inertia.filter(|_| status == Status::Converged)?;
     let stress = |(force, moment): &(Vector3<f64>, Vector3<f64>)| force.amax().max(moment.amax());

@@ -1,6 +1,6 @@
-//! From a problem to an equilibrium.
+//! The equilibrium of a problem: its search and its data.
 
-mod apart;
+mod active_set;
 pub(crate) mod guess;
 mod intrinsic;
 mod search;
@@ -21,7 +21,7 @@ use stagewise::{Inertia, Multipliers, Residuals, Stationary};
 use std::ops::ControlFlow;
 use thiserror::Error;
 
-pub(crate) use intrinsic::{is_settled, of_solution};
+pub(crate) use intrinsic::of_solution;
 
 named! {
     /// How a solve ended.
@@ -36,7 +36,7 @@ named! {
     }
 }
 
-/// What a support does to the belt.
+/// The reaction of a support on the belt.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reaction {
     /// Arc length of the support from the start.
@@ -46,7 +46,7 @@ pub struct Reaction {
     pub wrench: Wrench,
 }
 
-/// What a link does to the belt.
+/// The force of a link on the belt.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LinkForce {
     /// Force on the belt at the link's point `to`, world axes; at `from` acts the opposite.
@@ -56,13 +56,13 @@ pub struct LinkForce {
 /// The outcome of a solve, in the units of its scenario.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Equilibrium {
-    /// What was solved.
+    /// The solved problem.
     pub(crate) problem: Problem,
     /// How the solve ended.
     pub status: Status,
-    /// One line for people: how it ended, and what to try.
+    /// One line for people: how the solve ended, and what to try.
     pub message: String,
-    /// What should be known before the result is relied on, one line each.
+    /// Warnings to read before the result is relied on, one line each.
     pub warnings: Vec<String>,
     /// Total potential, loads included.
     pub energy: f64,
@@ -72,25 +72,25 @@ pub struct Equilibrium {
     pub spine: Spine,
     /// Torsion ω_η at every node.
     pub torsion: Vec<f64>,
-    /// What the belt beyond every node does to the part before it; empty where the method knows no forces.
+    /// Internal force and moment at every node, of the belt beyond on the part before; empty where the method has no forces.
     pub internal: Vec<Wrench>,
-    /// What each support does to the belt, in the order of the scenario; empty where the method knows no forces.
+    /// Reaction of each support, in the order of the scenario; empty where the method has no forces.
     pub reactions: Vec<Reaction>,
-    /// What each link does to the belt, in the order of the scenario.
+    /// Force of each link, in the order of the scenario.
     pub links: Vec<LinkForce>,
-    /// Signed half turns of a closed belt as it ended, `None` of an open one.
+    /// Signed half turns of the closed belt found; `None` of an open belt.
     pub half_turns: Option<i32>,
-    /// The second variation, where it can be decided.
+    /// Stability by the second variation, where it is decided.
     pub stability: Option<Stability>,
-    /// How far the shape is from a solution of its discrete equations, lengths in U and energy in mean R_f/U.
+    /// Largest residual of the shape's discrete equations, lengths in U and energy in mean R_f/U.
     pub residuals: Residuals,
     /// Iterations, over all attempts.
     pub iterations: usize,
-    /// The programme that was solved; `None` where the method knows no multipliers.
+    /// The solved programme; `None` where the method has no multipliers.
     pub(crate) solved: Option<Solved>,
 }
 
-/// Why a result is no equilibrium that more can be computed from: no modes, no derivatives, no continuation.
+/// The reason why a result has no modes, no derivatives and no continuation.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum Uncertified {
@@ -127,7 +127,7 @@ pub(crate) struct Solved {
 }
 
 impl Equilibrium {
-    /// What was solved.
+    /// The solved problem.
     pub fn problem(&self) -> &Problem {
         &self.problem
     }
@@ -142,8 +142,8 @@ impl Equilibrium {
         highest_point(&self.spine, &self.problem.bulge())
     }
 
-    /// The programme and its solution, where the solve has converged by a method that knows multipliers: what every
-    /// further computation starts from.
+    /// The programme and its solution, from which every other computation starts, if the solve has converged by a method
+    /// with multipliers.
     ///
     /// # Errors
     ///
@@ -158,7 +158,7 @@ impl Equilibrium {
         }
     }
 
-    /// The longest way in U from a node to the same place of the same belt in another shape.
+    /// The largest displacement in U of a node to the same place of the same belt in another shape.
     pub(crate) fn displacement(&self, other: &Self) -> f64 {
         let length = self.spine.length();
         let u = &other.spine.u;
@@ -173,8 +173,8 @@ impl Equilibrium {
         places.map(way).fold(0.0, f64::max)
     }
 
-    /// The same equilibrium, minimum or not, on a mesh of another number of elements; `None` where none is found next to it,
-    /// and where a scenario may not have so many elements.
+    /// The same equilibrium, minimum or not, on a mesh of another number of elements; `None` if no equilibrium is found next
+    /// to it, or if a scenario may not have so many elements.
     ///
     /// `proceed` is asked once an iteration whether to go on.
     pub fn refined(
@@ -182,7 +182,7 @@ impl Equilibrium {
         elements: usize,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Option<Self> {
-        /// Farther off, in U, it is another one.
+        /// Displacement of nodes up to which the refined shape is the same equilibrium, in U.
         const NEAR: f64 = 0.1;
         let solved = self.solved.as_ref()?;
         let problem = self.problem.with_elements(elements).ok()?;
@@ -211,14 +211,14 @@ impl Equilibrium {
     }
 }
 
-/// Where a search begins.
+/// The start of a search.
 #[derive(Clone, Copy)]
 enum Start<'a> {
     /// At the guess.
     Guess,
-    /// At a shape near to a minimum; anew where that leads to none.
+    /// At a shape near to a minimum; at the guess if this leads to no minimum.
     Near(&'a BeltPoint),
-    /// At a shape that need not be near to any, and nowhere else.
+    /// At a shape that need not be near to a minimum, and nowhere else.
     Shape(&'a BeltPoint),
     /// At a shape very near to a minimum, and nowhere else.
     Close(&'a BeltPoint),
@@ -256,7 +256,8 @@ pub(crate) fn from_fields(
     minimum_from(problem, &shape, proceed)
 }
 
-/// The equilibrium from a shape on the problem's mesh that is near to a minimum; anew where it leads to none.
+/// The equilibrium from a shape on the problem's mesh that is near to a minimum; from the guess if this shape leads to no
+/// minimum.
 pub(crate) fn solve_near(
     problem: &Problem,
     shape: &BeltPoint,

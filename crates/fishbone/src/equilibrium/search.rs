@@ -1,4 +1,4 @@
-//! The search for a minimum: where it starts, and where it starts again.
+//! The search for a minimum: its first start and its other starts.
 
 use crate::equilibrium::guess::{buckle, disturb, guess, inside, is_flat, ring};
 use crate::problem::program::{BeltPoint, BeltProgram, Piece};
@@ -9,42 +9,68 @@ use stagewise::{Outcome, Program, Settings, Solution};
 use std::f64::consts::PI;
 use std::ops::ControlFlow;
 
-/// First barrier from a guess: so high that the search first finds the supports, then lowers the energy.
-pub(super) const COLD: f64 = 10.0;
-/// First barrier from the solution of a problem nearby.
-const WARM: f64 = 0.1;
-/// First barrier from the same minimum on another mesh.
-pub(super) const CLOSE: f64 = 1e-3;
-const ITERATIONS: usize = 500;
-/// By how much the start is disturbed where the plain one leads to no minimum.
-const DISTURBANCES: [f64; 3] = [0.05, 0.2, 0.4];
-
-/// Slope of the ribs of a flat belt when it is tried whether it buckles.
-const SLANT: f64 = 0.7;
-
 type Proceed<'a> = dyn FnMut() -> ControlFlow<()> + 'a;
 
-/// What is asked of a search.
+/// Barriers, starts and limits of the search for a minimum.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct MinimumSettings {
+    /// First barrier from a guess, in mean R_f/U: so high that the search first finds the supports, then lowers the energy.
+    pub(super) cold_barrier: f64,
+    /// First barrier from the solution of a problem nearby, in mean R_f/U.
+    pub(super) warm_barrier: f64,
+    /// First barrier from the same minimum on another mesh, in mean R_f/U.
+    pub(super) close_barrier: f64,
+    /// Greatest count of iterations from one start, a number.
+    pub(super) iterations: usize,
+    /// Disturbances of a start that leads to no minimum, in turn, as shares of the rib bound.
+    pub(super) disturbances: [f64; 3],
+    /// Rib slope from which a flat belt is tried for buckling, dimensionless.
+    pub(super) slant: f64,
+    /// Steps in which a closed belt is twisted up, a number per half turn: steps of an eighth of a turn keep to the shape
+    /// that began as a ring.
+    pub(super) twist_steps: i32,
+}
+
+impl Default for MinimumSettings {
+    fn default() -> Self {
+        Self {
+            cold_barrier: 10.0,
+            warm_barrier: 0.1,
+            close_barrier: 1e-3,
+            iterations: 500,
+            disturbances: [0.05, 0.2, 0.4],
+            slant: 0.7,
+            twist_steps: 4,
+        }
+    }
+}
+
+/// Count of flat nodes from which a belt under load counts as flat, besides those of stiff pieces, as a share of all nodes.
+const FLAT_SHARE: f64 = 0.1;
+
+/// A search for a minimum.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Search {
-    /// The side on which the guess bulges.
+    /// Direction in which the guess bulges, world axes, of any length.
     pub(super) bulge: Vector3<f64>,
-    /// Largest residual of a converged point.
+    /// Largest residual of a converged point, lengths in U and energy in mean R_f/U.
     pub(super) tolerance: f64,
+    /// Barriers, starts and limits.
+    pub(super) settings: MinimumSettings,
 }
 
 impl Search {
-    /// The guess, evaluated and left as it is.
+    /// The guess with its values, without iterations.
     pub(super) fn start(&self, program: &BeltProgram) -> Solution<BeltPoint> {
         let settings = Settings {
             iterations: 0,
-            ..self.settings(COLD)
+            ..self.interior_point(self.settings.cold_barrier)
         };
         let start = guess(program, &self.bulge);
         stagewise::minimise(program, &settings, start, &mut || ControlFlow::Continue(()))
     }
 
-    /// Solves on the mesh asked for; by way of a coarse one where there is one, so that refining a mesh does not lead to
+    /// Solves on the problem's mesh; by way of a coarse mesh if one is given, so that refining a mesh does not lead to
     /// another shape of the belt.
     pub(super) fn run(
         &self,
@@ -58,11 +84,13 @@ impl Search {
         let found = self.cold(coarse, proceed);
         let fine = prolong(coarse, &found.at.point, program);
         if found.outcome == Outcome::Interrupted {
-            // The shape still has to be one of the mesh asked for.
-            return self.minimise(program, fine, WARM, &mut || ControlFlow::Break(()));
+            // The result must be a shape on the problem's mesh all the same.
+            return self.minimise(program, fine, self.settings.warm_barrier, &mut || {
+                ControlFlow::Break(())
+            });
         }
         let refined = self
-            .minimise(program, fine, WARM, proceed)
+            .minimise(program, fine, self.settings.warm_barrier, proceed)
             .after(found.iterations);
         if rank(&refined) >= rank(&found) || refined.outcome == Outcome::Interrupted {
             return refined;
@@ -70,7 +98,7 @@ impl Search {
         better(refined, |_| self.cold(program, proceed))
     }
 
-    /// Goes on from the minimum of a programme nearby; anew where that leads to none.
+    /// Goes on from the minimum of a programme nearby; from the guess if this leads to no minimum.
     pub(super) fn again(
         &self,
         program: &BeltProgram,
@@ -82,21 +110,26 @@ impl Search {
             .after(iterations)
     }
 
-    /// Searches from a shape of the same mesh; anew where that leads to no minimum.
+    /// Searches from a shape of the same mesh; from the guess if this leads to no minimum.
     pub(super) fn from(
         &self,
         program: &BeltProgram,
         point: BeltPoint,
         proceed: &mut Proceed,
     ) -> Solution<BeltPoint> {
-        let near = self.minimise(program, inside(program, point), WARM, proceed);
+        let near = self.minimise(
+            program,
+            inside(program, point),
+            self.settings.warm_barrier,
+            proceed,
+        );
         if is_done(&near) {
             return near;
         }
         better(near, |_| self.cold(program, proceed))
     }
 
-    /// Searches from a shape of the same mesh and from nowhere else, with a first barrier as it is near to a minimum or not.
+    /// Searches from a shape of the same mesh and from nowhere else, with a given first barrier.
     pub(super) fn only_from(
         &self,
         program: &BeltProgram,
@@ -107,25 +140,26 @@ impl Search {
         self.minimise(program, inside(program, point), barrier, proceed)
     }
 
-    /// Searches from the guess, then from other starts, until a minimum is found; the best that was found otherwise.
+    /// Searches from the guess, then from other starts, until a minimum is found; if none is, the best end.
     fn cold(&self, program: &BeltProgram, proceed: &mut Proceed) -> Solution<BeltPoint> {
         let start = match program.half_turns {
             None => guess(program, &self.bulge),
             Some(half_turns) => self.twisted_up(program, half_turns, proceed),
         };
-        let mut best = self.minimise(program, start.clone(), COLD, proceed);
+        let mut best = self.minimise(program, start.clone(), self.settings.cold_barrier, proceed);
         if !is_done(&best) {
             best = better(best, |_| self.by_way_of_another(program, &start, proceed));
         }
-        for (slope, wave) in [(SLANT, 0.0), (-SLANT, 0.0), (0.0, 1.0), (0.0, 2.0)] {
+        let slant = self.settings.slant;
+        for (slope, wave) in [(slant, 0.0), (-slant, 0.0), (0.0, 1.0), (0.0, 2.0)] {
             if best.outcome != Outcome::Interrupted && is_flat_under_load(program, &best.at.point) {
                 best = better(best, |best| {
                     let buckled = buckle(program, &best.at.point, slope, wave, &self.bulge);
-                    self.minimise(program, buckled, WARM, proceed)
+                    self.minimise(program, buckled, self.settings.warm_barrier, proceed)
                 });
             }
         }
-        for share in DISTURBANCES {
+        for share in self.settings.disturbances {
             if is_done(&best) {
                 break;
             }
@@ -135,7 +169,8 @@ impl Search {
                 } else {
                     &start
                 };
-                self.minimise(program, disturb(program, from, share), COLD, proceed)
+                let disturbed = disturb(program, from, share);
+                self.minimise(program, disturbed, self.settings.cold_barrier, proceed)
             });
         }
         best
@@ -148,22 +183,26 @@ impl Search {
         half_turns: i32,
         proceed: &mut Proceed,
     ) -> BeltPoint {
-        /// Steps of an eighth of a turn keep to the shape that began as a ring.
-        const STEPS: i32 = 4;
+        let steps = self.settings.twist_steps;
         let mut point = ring(program, &self.bulge);
-        for step in 1..=STEPS * half_turns.abs() {
-            let angle = PI * f64::from(half_turns.signum() * step) / f64::from(STEPS);
+        for step in 1..=steps * half_turns.abs() {
+            let angle = PI * f64::from(half_turns.signum() * step) / f64::from(steps);
             let cut = program.cut_and_twisted(angle);
             point = self
-                .minimise(&cut, inside(&cut, point), WARM, proceed)
+                .minimise(
+                    &cut,
+                    inside(&cut, point),
+                    self.settings.warm_barrier,
+                    proceed,
+                )
                 .at
                 .point;
         }
         inside(program, point)
     }
 
-    /// Solves with another energy, and from there with the one asked for: with `wunderlich`, which keeps the ribs apart of
-    /// itself, or where that fails with `sadowsky`, which lets them come close.
+    /// Solves with another energy model, and from its solution with the programme's own: first `wunderlich`, which keeps the
+    /// ribs apart of itself; for a `wunderlich` programme `sadowsky`, which lets them come close.
     fn by_way_of_another(
         &self,
         program: &BeltProgram,
@@ -175,10 +214,15 @@ impl Search {
             EnergyModel::Wunderlich => EnergyModel::Sadowsky,
             EnergyModel::Fishbone | EnergyModel::Sadowsky => EnergyModel::Wunderlich,
         };
-        let found = self.minimise(&other, start.clone(), COLD, proceed);
+        let found = self.minimise(&other, start.clone(), self.settings.cold_barrier, proceed);
         let iterations = found.iterations;
-        self.minimise(program, inside(program, found.at.point), WARM, proceed)
-            .after(iterations)
+        self.minimise(
+            program,
+            inside(program, found.at.point),
+            self.settings.warm_barrier,
+            proceed,
+        )
+        .after(iterations)
     }
 
     fn minimise(
@@ -188,34 +232,33 @@ impl Search {
         barrier: f64,
         proceed: &mut Proceed,
     ) -> Solution<BeltPoint> {
-        stagewise::minimise(program, &self.settings(barrier), start, proceed)
+        stagewise::minimise(program, &self.interior_point(barrier), start, proceed)
     }
 
-    fn settings(&self, barrier: f64) -> Settings {
+    fn interior_point(&self, barrier: f64) -> Settings {
         Settings {
             tolerance: self.tolerance,
-            iterations: ITERATIONS,
+            iterations: self.settings.iterations,
             barrier,
         }
     }
 }
 
-/// Whether to look no further.
+/// Whether the search is over.
 fn is_done(solution: &Solution<BeltPoint>) -> bool {
     solution.outcome == Outcome::Interrupted || rank(solution) == 2
 }
 
-/// Whether a good part of a belt under load has stayed flat: there the slope of its ribs costs nothing, and what it buckles
-/// into cannot be seen in the second variation.
+/// Whether a good part of a belt under load has stayed flat: there the slope of its ribs costs nothing, and the second
+/// variation does not show the shape into which it buckles.
 pub(super) fn is_flat_under_load(program: &BeltProgram, point: &BeltPoint) -> bool {
-    const PART: f64 = 0.1;
     let fields = &point.fields;
     let flat = fields.iter().filter(|fields| is_flat(fields)).count();
     let stiff = fields.len() - program.elements().count();
-    program.is_loaded() && flat as f64 > PART * fields.len() as f64 + stiff as f64
+    program.is_loaded() && flat as f64 > FLAT_SHARE * fields.len() as f64 + stiff as f64
 }
 
-/// The better of two ends, of equals the lower, with the iterations of both.
+/// The better of two ends, of equal ranks the one with the lower energy, with the iterations of both.
 fn better(
     best: Solution<BeltPoint>,
     next: impl FnOnce(&Solution<BeltPoint>) -> Solution<BeltPoint>,
@@ -231,7 +274,7 @@ fn better(
     }
 }
 
-/// The better of two ends has the higher rank: a minimum, another equilibrium, anything else.
+/// Rank of an end, higher for the better: 2 of a minimum, 1 of another equilibrium, 0 of anything else.
 fn rank(solution: &Solution<BeltPoint>) -> u8 {
     match solution.outcome {
         Outcome::Converged if solution.is_minimum() => 2,
@@ -240,7 +283,7 @@ fn rank(solution: &Solution<BeltPoint>) -> u8 {
     }
 }
 
-/// The same shape on another mesh.
+/// A shape prolonged to another mesh.
 pub(super) fn prolong(from: &BeltProgram, point: &BeltPoint, to: &BeltProgram) -> BeltPoint {
     let (nodes, known) = (to.nodes(), from.nodes());
     let after_joint = |k: usize| k > 0 && matches!(to.pieces[k - 1], Piece::Joint { .. });
@@ -255,7 +298,7 @@ pub(super) fn prolong(from: &BeltProgram, point: &BeltPoint, to: &BeltProgram) -
     inside(to, prolonged)
 }
 
-/// The inequalities' multipliers on another mesh: those of a stage shared out by length.
+/// The inequalities' multipliers prolonged to another mesh: the multipliers of a stage are shared out by length.
 pub(super) fn prolong_inequalities(
     from: &BeltProgram,
     multipliers: &[f64],
@@ -274,12 +317,12 @@ pub(super) fn prolong_inequalities(
         let share = element.length / whole.length;
         let rows = &multipliers[layout.stage_rows(parent)];
         let of_bound = |bound: usize| {
-            let mut known = whole.strips().bounds().zip(rows);
+            let mut known = from.bounds(parent, whole).places().zip(rows);
             known
                 .find(|(known, _)| *known == bound)
                 .map_or(0.0, |(_, multiplier)| share * multiplier)
         };
-        prolonged.extend(element.strips().bounds().map(of_bound));
+        prolonged.extend(to.bounds(k, element).places().map(of_bound));
     }
     prolonged
 }

@@ -1,6 +1,6 @@
-//! What is read and written: scenarios as TOML and JSON, results as JSON, numbers of a scenario by the names of their fields.
+//! Input and output: scenarios as TOML and JSON, results as JSON, numbers of a scenario by the names of their fields.
 //!
-//! This room and the crates that it needs are there with the feature `io`.
+//! This room and the crates that it needs are built with the feature `io`.
 
 mod path;
 pub mod result;
@@ -16,7 +16,7 @@ mod tests {
     use crate::strip::developable::EnergyModel;
     use serde::Serialize;
 
-    /// All names are told apart, and serde knows each by the same.
+    /// Checks that all names differ, and that serde writes each name.
     fn check<T: Named + Serialize>(all: &[T]) {
         let names: Vec<_> = all.iter().map(T::name).collect();
         assert_eq!(names, T::names());

@@ -1,4 +1,4 @@
-//! Ways through the space of problems along which numbers change that are named as in scenario files.
+//! Paths through the space of problems along which numbers change, named as in scenario files.
 
 use crate::analysis::path::{Change, NoPath, Path};
 use crate::problem::Problem;
@@ -14,7 +14,7 @@ struct Numbers {
 /// A number of a scenario that changes.
 #[derive(Debug)]
 struct Number {
-    /// Where it stands, a JSON pointer.
+    /// Place in the scenario, a JSON pointer.
     pointer: String,
     from: f64,
     to: f64,
@@ -26,7 +26,7 @@ impl Path {
     ///
     /// # Errors
     ///
-    /// [`NoPath`] where no such number stands in the scenario, and where the scenario at the end is not valid.
+    /// [`NoPath`] if a field of the scenario holds no number, or if the scenario at the end is not valid.
     pub fn numbers(problem: &Problem, changes: &[(String, f64)]) -> Result<Self, NoPath> {
         let base = serde_json::to_value(problem.scenario()).expect("a scenario is plain data");
         let number = |(field, to): &(String, f64)| {
@@ -65,7 +65,7 @@ impl Change for Numbers {
         Problem::new(scenario).map_err(NoPath::Invalid)
     }
 
-    /// The number that changes where there is one, else how far along the path the place is.
+    /// The number that changes if there is only one, else the place itself.
     fn parameter(&self, place: f64) -> f64 {
         match self.numbers.as_slice() {
             [number] => number.at(place),
@@ -83,8 +83,9 @@ impl Number {
     }
 }
 
-/// A value that is no number as text; by its kind where that is long.
+/// A value that is no number, as text; its kind if the text is long.
 fn shown(value: &Value) -> String {
+    /// Length of the longest text that is shown, in bytes.
     const SHORT: usize = 40;
     let text = value.to_string();
     match value {

@@ -1,4 +1,4 @@
-//! The result schema `fishbone.result/1`: an equilibrium as it is written to JSON.
+//! The result schema `fishbone.result/1`: an equilibrium in JSON.
 
 use crate::equilibrium::{Equilibrium, LinkForce, Status};
 use crate::geometry::Wrench;
@@ -8,17 +8,16 @@ use crate::surface;
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 
-/// Name and version of the schema.
+/// Name and version of the result schema, a word.
 pub const SCHEMA: &str = "fishbone.result/1";
 
 type Point = [f64; 3];
 
 /// A result as it stands in JSON, in the units of the scenario.
 ///
-/// `u` and all that has one entry a node share their first dimension; frames are row-major matrices whose columns are
-/// ξ, η, ζ.
+/// All arrays with one entry a node have the length of `u`; frames are row-major matrices whose columns are ξ, η, ζ.
 #[derive(Debug, Clone, Serialize)]
-pub struct Record<'a> {
+pub(crate) struct Record<'a> {
     schema: &'static str,
     status: Status,
     message: &'a str,
@@ -91,7 +90,7 @@ struct HighestPoint {
     position: Point,
 }
 
-/// All null where the belt does not bend: infinity has no place in JSON.
+/// All null of a flat belt: JSON has no infinity.
 #[derive(Debug, Clone, Serialize)]
 struct LeastBendRadius {
     value: Option<f64>,
@@ -99,7 +98,7 @@ struct LeastBendRadius {
     v: Option<f64>,
 }
 
-/// All null where the belt does not bend.
+/// All null of a flat belt.
 #[derive(Debug, Clone, Serialize)]
 struct LeastSpineRadius {
     value: Option<f64>,
@@ -128,7 +127,7 @@ impl Equilibrium {
 
 impl<'a> Record<'a> {
     /// The record of an equilibrium.
-    pub fn new(equilibrium: &'a Equilibrium) -> Self {
+    pub(crate) fn new(equilibrium: &'a Equilibrium) -> Self {
         let spine = &equilibrium.spine;
         let highest = equilibrium.highest_point();
         let margin = surface::rib_margin(spine);

@@ -1,4 +1,4 @@
-//! From a scenario to a programme: which node everything acts on, lengths in U and energy in mean R_f/U.
+//! The assembly of a scenario into a programme: nodes of supports, links and loads; lengths in U and energy in mean R_f/U.
 
 use super::Problem;
 use crate::geometry::Pose;
@@ -12,20 +12,20 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use std::f64::consts::PI;
 
 impl Problem {
-    /// The programme on a mesh of about `count` elements, no rib bounded by edges beyond those of its own stretch.
+    /// The programme on a mesh of about `count` elements, without active edges.
     ///
-    /// Its supports are those of the scenario in their order, or one at the start where there is none; its links are
-    /// those of the scenario, then the seam of a closed belt.
+    /// Its supports are the scenario's in their order, or one at the start if the scenario has none; its links are the
+    /// scenario's, then the seam of a closed belt.
     pub fn program(&self, count: usize) -> BeltProgram {
         self.program_of(self.belt.pieces(count, &self.breaks()))
     }
 
-    /// How many elements every stretch of the belt has on a mesh of about `count`.
+    /// Number of elements of every stretch of the belt on a mesh of about `count`.
     pub(super) fn shares(&self, count: usize) -> Vec<usize> {
         self.belt.shares(count, &self.breaks())
     }
 
-    /// The programme with so many elements to every stretch; `None` where there are not as many stretches.
+    /// The programme with given numbers of elements, one a stretch; `None` where the belt has another number of stretches.
     pub(super) fn program_shared(&self, shares: &[usize]) -> Option<BeltProgram> {
         let pieces = self.belt.pieces_shared(shares, &self.breaks())?;
         Some(self.program_of(pieces))
@@ -56,7 +56,7 @@ impl Problem {
     }
 
     /// The spine of a shape of one of the problem's programmes, in the units of the scenario.
-    pub fn spine(&self, program: &BeltProgram, point: &BeltPoint) -> Spine {
+    pub(crate) fn spine(&self, program: &BeltProgram, point: &BeltPoint) -> Spine {
         let length = self.units.length;
         let pose = |pose: &Pose| Pose {
             frame: pose.frame,
@@ -81,7 +81,8 @@ impl Problem {
         }
     }
 
-    /// What the potential of the loads lacks for its zero to be at the world's origin and not at the programme's.
+    /// Difference between the loads' potential with its zero at the world's origin and the potential with its zero at the
+    /// programme's origin.
     pub(crate) fn potential_of_origin(&self) -> f64 {
         let gravity = Vector3::from(self.scenario.loads.gravity.unwrap_or_default());
         let weight = gravity * self.belt.density * self.belt.length();
@@ -110,7 +111,7 @@ impl Problem {
             .collect()
     }
 
-    /// Whether nothing acts on a closed belt but, it may be, a single support, which then bears nothing.
+    /// Whether a closed belt is free of loads and links and has at most one support, which then bears nothing.
     fn is_left_alone(&self) -> bool {
         let loads = &self.scenario.loads;
         let unloaded = self.weight() == Vector3::zeros() && loads.points.is_empty();
@@ -165,7 +166,7 @@ impl Problem {
         gravity * (self.belt.density * self.units.length / self.units.force())
     }
 
-    /// How the end of a closed belt joins its start.
+    /// The two links of the seam, between the start and the end of a closed belt.
     fn seam(&self, half_turns: i32, last: usize) -> [NodeLink; 2] {
         let turn = UnitQuaternion::from_scaled_axis(PI * f64::from(half_turns) * Vector3::y());
         let sign = self.belt.seam_sign();
@@ -179,7 +180,7 @@ impl Problem {
     }
 }
 
-/// The start of a belt that nothing holds, in the natural pose.
+/// The support of a belt that has none: its start in the natural pose.
 fn at_rest() -> NodeSupport {
     NodeSupport {
         node: 0,
@@ -219,7 +220,7 @@ impl Places {
         self.0.len() - 1
     }
 
-    /// The node at an arc length in U; the one before the jump where there are two. At the end, the last.
+    /// The node at an arc length in U; of two nodes there, the one before the jump. At the end, the last node.
     fn node(&self, u: f64) -> usize {
         if u >= 1.0 {
             return self.last();

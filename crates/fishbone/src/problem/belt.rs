@@ -4,13 +4,12 @@ use crate::geometry::gauss_points;
 use crate::problem::program::Piece;
 use crate::scenario::error::ScenarioError;
 use crate::scenario::{BeltSpec, Rigidity, SAME_PLACE, SegmentSpec};
-use crate::strip::developable::Curl;
+use crate::strip::element::Curl;
 use crate::strip::element::Element;
-use crate::strip::ribs::FURTHER;
 
 /// A belt in the units of its scenario.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Belt {
+pub(crate) struct Belt {
     /// Width V.
     pub width: f64,
     /// Segments in order along the spine.
@@ -23,7 +22,7 @@ pub struct Belt {
 
 /// A piece of the belt of one kind.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Segment {
+pub(crate) enum Segment {
     /// A flexible strip.
     Strip(Strip),
     /// A stiffener.
@@ -40,20 +39,20 @@ pub enum Segment {
 
 /// A flexible strip of constant in-plane curvature.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Strip {
+pub(crate) struct Strip {
     /// Length along the spine.
     pub length: f64,
     /// In-plane curvature κ_g of the flat board.
     pub geodesic: f64,
     /// Rigidity R_f of the whole width.
     pub rigidity: Rigidity,
-    /// What it is bent to when nothing acts on it.
+    /// Natural bend.
     pub curl: Curl,
 }
 
 /// A place that must be a node of the mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Break {
+pub(crate) struct Break {
     /// Arc length.
     pub u: f64,
     /// Whether a moment may act there, so that the bend jumps.
@@ -63,16 +62,18 @@ pub struct Break {
 /// A stretch of a segment between two breaks.
 struct Stretch<'a> {
     segment: &'a Segment,
-    /// From where to where, counted from the start of the segment.
+    /// First arc length, from the start of the segment.
     from: f64,
     to: f64,
-    /// The joint that leads to it.
+    /// The joint before the stretch, if any.
     joint: Option<Piece>,
 }
 
 impl Stretch<'_> {
-    /// Elements that it takes where the rigidity changes along it: what bends goes with its inverse.
+    /// Least number of elements that the stretch needs where its rigidity changes along it: bend goes with the inverse of
+    /// rigidity.
     fn fewest(&self) -> usize {
+        /// Elements for each factor e of rigidity along a stretch, a number.
         const PER_FACTOR_E: f64 = 8.0;
         let Segment::Strip(strip) = self.segment else {
             return 1;
@@ -90,7 +91,7 @@ impl Strip {
         }
     }
 
-    /// Integral of the rigidity, exact for one linear between entries.
+    /// Integral of the rigidity, exact for a rigidity linear between entries.
     fn total_rigidity(&self) -> f64 {
         let mut places = vec![0.0, self.length];
         if let Rigidity::Table(table) = &self.rigidity {
@@ -103,7 +104,7 @@ impl Strip {
             .sum()
     }
 
-    /// Whether the fields go on from this strip to another without a jump.
+    /// Whether the fields are continuous from this strip to another.
     fn goes_on_to(&self, next: &Self) -> bool {
         self.geodesic == next.geodesic
             && self.curl == next.curl
@@ -138,7 +139,7 @@ impl Segment {
     }
 
     /// Length along the spine.
-    pub fn length(&self) -> f64 {
+    pub(crate) fn length(&self) -> f64 {
         match self {
             Self::Strip(strip) => strip.length,
             Self::Rigid { length } => *length,
@@ -146,7 +147,7 @@ impl Segment {
         }
     }
 
-    /// Arc lengths inside the segment where its rigidity has a kink.
+    /// Arc lengths inside the segment where its rigidity has a corner.
     fn table_entries(&self, same: f64) -> Vec<f64> {
         let Self::Strip(Strip {
             rigidity: Rigidity::Table(table),
@@ -182,7 +183,7 @@ impl Belt {
     /// # Errors
     ///
     /// [`ScenarioError`] where a segment that bends has no rigidity.
-    pub fn new(spec: &BeltSpec) -> Result<Self, ScenarioError> {
+    pub(crate) fn new(spec: &BeltSpec) -> Result<Self, ScenarioError> {
         let segments = spec.segments.iter();
         let segments: Option<_> = segments
             .map(|segment| Segment::new(segment, spec))
@@ -200,20 +201,20 @@ impl Belt {
     }
 
     /// Length U of the spine.
-    pub fn length(&self) -> f64 {
+    pub(crate) fn length(&self) -> f64 {
         self.segments.iter().map(Segment::length).sum()
     }
 
-    /// Mean rigidity over what bends, the scale of energies.
-    pub fn mean_rigidity(&self) -> f64 {
+    /// Mean rigidity over the flexible strips, the scale of energies.
+    pub(crate) fn mean_rigidity(&self) -> f64 {
         let strips = || self.segments.iter().filter_map(Segment::strip);
         let length: f64 = strips().map(|strip| strip.length).sum();
         strips().map(Strip::total_rigidity).sum::<f64>() / length
     }
 
-    /// Whether bend and slope go on through the seam of a closed belt, up to the sign that an odd number of half turns
-    /// gives them; the slope does but at a stiffener.
-    pub fn goes_on_through_seam(&self) -> [bool; 2] {
+    /// Whether bend and slope are continuous through the seam of a closed belt, up to the sign that an odd number of half
+    /// turns gives them; the slope is, except at a stiffener.
+    pub(crate) fn goes_on_through_seam(&self) -> [bool; 2] {
         let (Some(Segment::Strip(last)), Some(Segment::Strip(first))) =
             (self.segments.last(), self.segments.first())
         else {
@@ -232,30 +233,33 @@ impl Belt {
     }
 
     /// The sign that bend, slope and in-plane curvature take on across the seam.
-    pub fn seam_sign(&self) -> f64 {
+    pub(crate) fn seam_sign(&self) -> f64 {
         match self.half_turns.unwrap_or(0) % 2 {
             0 => 1.0,
             _ => -1.0,
         }
     }
 
-    /// `count` elements shared out by length, a few more where that takes parts of one between two breaks, ends of
-    /// segments or entries of a table of rigidity; lengths in U, rigidity in its mean. A stiffened stretch is one piece.
-    pub fn pieces(&self, count: usize, breaks: &[Break]) -> Vec<Piece> {
+    /// The pieces of a mesh of `count` elements, shared out by length. There are more elements where a share is not whole,
+    /// between two breaks, ends of segments or entries of a table of rigidity. A stiffened stretch is one piece.
+    ///
+    /// Units: lengths in U, rigidity in its mean.
+    pub(crate) fn pieces(&self, count: usize, breaks: &[Break]) -> Vec<Piece> {
         let shared = self.pieces_shared(&self.shares(count, breaks), breaks);
         shared.expect("a share for every stretch")
     }
 
-    /// How many elements every stretch gets of a count.
-    pub fn shares(&self, count: usize, breaks: &[Break]) -> Vec<usize> {
+    /// Number of elements of every stretch, of `count` in all.
+    pub(crate) fn shares(&self, count: usize, breaks: &[Break]) -> Vec<usize> {
         let of_length = |stretch: &Stretch| (stretch.to - stretch.from) / self.length();
         let stretches = self.stretches(breaks);
         let share = |stretch: &Stretch| share(count, of_length(stretch)).max(stretch.fewest());
         stretches.iter().map(share).collect()
     }
 
-    /// The same with so many elements to every stretch; `None` where there are not as many stretches.
-    pub fn pieces_shared(&self, shares: &[usize], breaks: &[Break]) -> Option<Vec<Piece>> {
+    /// The pieces of a mesh with given numbers of elements, one a stretch; `None` where the belt has another number of
+    /// stretches.
+    pub(crate) fn pieces_shared(&self, shares: &[usize], breaks: &[Break]) -> Option<Vec<Piece>> {
         let (length, rigidity) = (self.length(), self.mean_rigidity());
         let stretches = self.stretches(breaks);
         if stretches.len() != shares.len() {
@@ -332,7 +336,6 @@ impl Belt {
                     bend: strip.curl.bend * length,
                     ..strip.curl
                 },
-                further: [None; FURTHER],
             })
         })
     }
@@ -340,6 +343,7 @@ impl Belt {
 
 /// The share of a count by weight, out of 1, rounded up: no element is longer than if all were alike.
 fn share(count: usize, weight: f64) -> usize {
+    /// Rounding error of a share, in elements: a share above a whole number by less is that number.
     const ROUNDING: f64 = 1e-9;
     let due = weight * count as f64;
     ((due - ROUNDING).ceil() as usize).max(1)

@@ -1,46 +1,42 @@
-//! A mesh that stays the same while the numbers of a problem change.
+//! A mesh that stays the same while the data of a problem change.
 
 use super::Problem;
 use crate::problem::program::{BeltProgram, Piece};
-use crate::strip::ribs::{Edge, FURTHER};
+use crate::strip::bounds::ActiveEdges;
 
-/// The mesh of a solution, and the edges that bound its ribs: what stays the same while the solution is continued.
+/// The mesh of a solution and its active edges, which stay the same while the solution is continued.
 #[derive(Debug, Clone)]
 pub(crate) struct Mesh {
     /// Number of elements of every stretch of the belt.
     shares: Vec<usize>,
-    /// Of every strip the active edges beyond those of its own stretch.
-    further: Vec<Option<[Option<Edge>; FURTHER]>>,
+    /// Whether each piece is a strip, and its active edges.
+    pieces: Vec<(bool, ActiveEdges)>,
 }
 
 impl Mesh {
-    /// That of a programme of a problem.
+    /// The mesh of a programme of a problem.
     pub(crate) fn of(problem: &Problem, program: &BeltProgram) -> Self {
-        let further = |piece: &Piece| match piece {
-            Piece::Strip(element) => Some(element.further),
-            Piece::Rigid { .. } | Piece::Joint { .. } => None,
-        };
+        let pieces = program.pieces.iter().map(is_strip);
         Self {
             shares: problem.shares(problem.elements()),
-            further: program.pieces.iter().map(further).collect(),
+            pieces: pieces.zip(program.edges.iter().copied()).collect(),
         }
     }
 }
 
 impl Problem {
-    /// The programme on a mesh; `None` where the belt has other stretches than those that were meshed.
+    /// The programme on a mesh; `None` where the belt has other stretches than the mesh.
     pub(crate) fn program_on(&self, mesh: &Mesh) -> Option<BeltProgram> {
         let mut program = self.program_shared(&mesh.shares)?;
-        if program.pieces.len() != mesh.further.len() {
+        let pieces = program.pieces.iter().map(is_strip);
+        if !pieces.eq(mesh.pieces.iter().map(|(is_strip, _)| *is_strip)) {
             return None;
         }
-        for (piece, held) in program.pieces.iter_mut().zip(&mesh.further) {
-            match (piece, held) {
-                (Piece::Strip(element), Some(held)) => element.further = *held,
-                (Piece::Rigid { .. } | Piece::Joint { .. }, None) => (),
-                _ => return None,
-            }
-        }
+        program.edges = mesh.pieces.iter().map(|(_, edges)| *edges).collect();
         Some(program)
     }
+}
+
+fn is_strip(piece: &Piece) -> bool {
+    matches!(piece, Piece::Strip(_))
 }

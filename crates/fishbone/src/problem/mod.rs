@@ -1,10 +1,14 @@
-//! A belt problem: a validated scenario with its belt, its units and its origin. All that is computed starts from one.
+//! A belt problem: a validated scenario with its belt, its units and its origin. Every computation starts from a
+//! [`Problem`].
 //!
-//! A [`Problem`] can only be made of a scenario that [`Scenario::validate`] passes, and cannot be changed afterwards: a problem
-//! with other numbers is another problem, validated in its turn.
+//! A [`Problem`] can only be made of a scenario that [`Scenario::validate`] passes, and cannot be changed afterwards: a
+//! problem with other numbers is another problem, validated in its turn.
 
+mod active_set;
 mod assembly;
 pub mod belt;
+mod constraints;
+mod edges;
 mod mesh;
 pub mod program;
 mod reach;
@@ -24,10 +28,10 @@ pub use reach::OutOfReach;
 pub(crate) use reach::number;
 pub use units::Units;
 
-/// How far the products of a frame's columns may be off those of a rotation.
+/// Tolerance of the products of a frame's columns against those of a rotation, dimensionless.
 const ROTATION_TOLERANCE: f64 = 1e-6;
 
-/// A validated scenario, with the belt that it describes, the units of its programme and where that has its origin.
+/// A validated scenario, with the belt that it describes, and the units and the origin of its programme.
 ///
 /// A clone shares the scenario and the belt.
 ///
@@ -49,18 +53,18 @@ pub struct Problem {
     scenario: Arc<Scenario>,
     belt: Arc<Belt>,
     units: Units,
-    /// Where the programme has its origin, world axes, so that a belt far from the world's loses no digits: at the first
-    /// support.
+    /// Origin of the programme, world axes: at the first support, so that a belt far from the world's origin loses no
+    /// digits.
     origin: Vector3<f64>,
     formulation: Formulation,
 }
 
-/// The method of solution, with what it takes beyond the belt.
+/// The method of solution, with its data beyond the belt.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Formulation {
     /// Bend and rib slope as the only unknowns.
     Intrinsic,
-    /// The source's own, for a belt clamped at both ends.
+    /// The source's own method, for a belt clamped at both ends.
     Ritz {
         /// Poses of the start and of the end.
         ends: [Pose; 2],
@@ -163,7 +167,7 @@ impl Problem {
         })
     }
 
-    /// The problem of a scenario that differs from this one's in nothing of the belt.
+    /// The problem of a scenario with the same belt.
     fn on_the_same_belt(&self, scenario: Scenario) -> Result<Self, ScenarioError> {
         scenario.validate()?;
         Self::of(scenario, Arc::clone(&self.belt))
@@ -187,7 +191,7 @@ impl Problem {
     }
 
     /// The belt, in the units of the scenario.
-    pub fn belt(&self) -> &Belt {
+    pub(crate) fn belt(&self) -> &Belt {
         &self.belt
     }
 
@@ -196,8 +200,8 @@ impl Problem {
         self.units
     }
 
-    /// Where its programmes have their origin, world axes: at the first support, unless a tracker has kept the origin while
-    /// that support moved. Units: those of the scenario.
+    /// Origin of its programmes, world axes: at the first support, unless a tracker has kept the origin while that support
+    /// moved. Units: those of the scenario.
     pub fn origin(&self) -> Vector3<f64> {
         self.origin
     }
@@ -208,18 +212,18 @@ impl Problem {
     }
 
     /// The direction along which the belt should bulge, world axes; of any length.
-    pub fn bulge(&self) -> Vector3<f64> {
+    pub(crate) fn bulge(&self) -> Vector3<f64> {
         Vector3::from(self.scenario.solver.bulge)
     }
 
-    /// The largest residual of what counts as converged: lengths in U and energy in mean R_f/U.
-    pub fn tolerance(&self) -> f64 {
+    /// The largest residual that counts as converged: lengths in U and energy in mean R_f/U.
+    pub(crate) fn tolerance(&self) -> f64 {
         self.scenario.solver.tolerance
     }
 
     /// The pose at which a support, given by its place in the scenario, holds the belt; `None` where there is no such
     /// support, or it leaves any part of the pose free. Units: those of the scenario.
-    pub fn clamp(&self, support: usize) -> Option<Pose> {
+    pub(crate) fn clamp(&self, support: usize) -> Option<Pose> {
         clamp(&self.scenario, support)
     }
 

@@ -1,8 +1,8 @@
 //! The constrained minimisation: energy of a chain of pieces under supports, links and loads, Eq. (34)–(36).
 //!
-//! Poses are not unknowns of their own: they are carried from the start along the pieces, so every point of the
-//! search is a belt without a break, and the conditions of supports and links are the only equations left. In the same
-//! way the rib slope is carried across a bend of the board, where the rib is one material line.
+//! Poses are not unknowns of their own: they are carried from the start along the pieces. So every point of the search is a
+//! belt without a break, and the conditions of supports and links are the only equations. In the same way the rib slope is
+//! carried across a bend of the board, where the rib is one material line.
 
 mod derivatives;
 mod link;
@@ -22,6 +22,7 @@ pub(crate) use support::Turn;
 pub use support::{Hold, NodeSupport};
 
 use crate::geometry::Pose;
+use crate::strip::bounds::{ACTIVE, ActiveEdges, RibBounds};
 use crate::strip::density::{Density, LANES, Motions};
 use crate::strip::developable::EnergyModel;
 use crate::strip::element::Element;
@@ -29,15 +30,15 @@ use nalgebra::{Rotation3, SVector, UnitQuaternion, Vector3, Vector6};
 use stagewise::{Distance, NodeVector};
 
 /// Unknowns of a node of a developable belt: a twist of the pose in world axes about the origin, then bend and rib slope.
-pub type DevelopableNode = NodeVector<8>;
+pub(crate) type DevelopableNode = NodeVector<8>;
 
-/// Rows of the conditions of one support or link.
-pub const ROWS: usize = 6;
+/// Rows of the conditions of one support or link, a number.
+pub(crate) const ROWS: usize = 6;
 /// Values or multipliers of the conditions of one support or link; unused rows are zero.
-pub type Rows = SVector<f64, ROWS>;
+pub(crate) type Rows = SVector<f64, ROWS>;
 
 /// The multipliers of a support or link, by its place: supports first, then links.
-pub fn rows_of(multipliers: &[f64], place: usize) -> Rows {
+pub(crate) fn rows_of(multipliers: &[f64], place: usize) -> Rows {
     Rows::from_column_slice(&multipliers[ROWS * place..ROWS * (place + 1)])
 }
 
@@ -46,6 +47,8 @@ pub fn rows_of(multipliers: &[f64], place: usize) -> Rows {
 pub struct BeltProgram<D = EnergyModel, const F: usize = 2, const N: usize = 8> {
     /// Pieces in order along the spine.
     pub pieces: Vec<Piece>,
+    /// Active edges of every piece; only strips have any.
+    pub edges: Vec<ActiveEdges>,
     /// Bending energy.
     pub model: D,
     /// Supports.
@@ -60,14 +63,14 @@ pub struct BeltProgram<D = EnergyModel, const F: usize = 2, const N: usize = 8> 
     pub half_turns: Option<i32>,
     /// Obstacles that nodes must not enter.
     pub obstacles: Vec<NodeObstacle>,
-    /// Fields of every node where they are prescribed.
+    /// Prescribed fields of every node.
     fixed: Vec<[Option<f64>; F]>,
 }
 
 /// A shape of the belt.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BeltPoint<const F: usize = 2> {
-    /// Fields at every node: bend, rib slope, and those that a density has besides.
+    /// Fields at every node: bend, rib slope, then any other fields of the density.
     pub fields: Vec<SVector<f64, F>>,
     /// Pose of every node; the first is an unknown, the others follow from it and the fields.
     pub poses: Vec<Pose>,
@@ -79,7 +82,7 @@ impl<const F: usize> Distance for BeltPoint<F> {
         self.poses.copy_from_slice(&other.poses);
     }
 
-    /// The longest way that a node is displaced, in U.
+    /// The largest displacement of a node, in U.
     fn distance(&self, other: &Self) -> f64 {
         let poses = self.poses.iter().zip(&other.poses);
         let moves = poses.map(|(a, b)| (a.position - b.position).norm());
@@ -88,10 +91,11 @@ impl<const F: usize> Distance for BeltPoint<F> {
 }
 
 impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
-    /// The programme of a chain of pieces that nothing holds or loads.
+    /// The programme of a chain of pieces without supports, links or loads.
     pub fn new(pieces: Vec<Piece>, model: D) -> Self {
         let nodes = pieces.len() + 1;
         Self {
+            edges: vec![[None; ACTIVE]; pieces.len()],
             pieces,
             model,
             supports: Vec::new(),
@@ -105,7 +109,7 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         .with_supports(Vec::new())
     }
 
-    /// The same with these supports in place of its own.
+    /// The programme with these supports in place of its own.
     pub fn with_supports(mut self, supports: Vec<NodeSupport>) -> Self {
         let nodes = self.pieces.len() + 1;
         self.fixed = (0..nodes).map(|node| self.fixed_by_pieces(node)).collect();
@@ -120,7 +124,7 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
 
     /// A closed belt cut open at its seam and twisted there by an angle in place of its half turns, as between two
     /// clamps.
-    pub fn cut_and_twisted(&self, angle: f64) -> Self {
+    pub(crate) fn cut_and_twisted(&self, angle: f64) -> Self {
         let mut cut = self.clone();
         for link in &mut cut.links {
             match &mut link.tie {
@@ -134,7 +138,7 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         cut
     }
 
-    /// What a stiffened stretch prescribes at a node: no bend inside, square ribs at its ends too.
+    /// Fields that a stiffened stretch prescribes at a node: no bend inside, square ribs at its ends too.
     fn fixed_by_pieces(&self, node: usize) -> [Option<f64>; F] {
         let beside = [node.checked_sub(1), Some(node)];
         let pieces = beside
@@ -148,7 +152,7 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         }
     }
 
-    /// Beside a stiffener at the seam of a closed belt the rib is square on both sides of the seam.
+    /// Prescribes a square rib on both sides of the seam of a closed belt if a stiffener is beside it.
     fn fix_across_seam(&mut self) {
         let is_rigid = |piece: Option<&Piece>| matches!(piece, Some(Piece::Rigid { .. }));
         let beside = is_rigid(self.pieces.first()) || is_rigid(self.pieces.last());
@@ -159,7 +163,7 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         }
     }
 
-    /// Where the rib is prescribed on one side of a joint, so it is on the other.
+    /// Prescribes the rib on the other side of a joint wherever it is prescribed on one side.
     fn fix_across_joints(&mut self) {
         for (k, piece) in self.pieces.iter().enumerate() {
             let Piece::Joint { angle } = *piece else {
@@ -172,7 +176,7 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         }
     }
 
-    /// Which fields of a node are unknowns, and not prescribed or carried on from the node before.
+    /// Whether each field of a node is an unknown: neither prescribed nor carried on from the node before.
     fn free(&self, node: usize) -> [bool; F] {
         let mut free = self.fixed[node].map(|fixed| fixed.is_none());
         free[1] &= !self.is_tied(node);
@@ -195,9 +199,9 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         }
     }
 
-    /// Gives a point the fields that are prescribed or carried on, and its poses.
+    /// Sets the prescribed and the carried fields of a point, and its poses.
     ///
-    /// A rib that would leave through a bend of the board is left as it is.
+    /// A rib that would leave through a bend of the board keeps its slope.
     pub fn settle(&self, point: &mut BeltPoint<F>) {
         for node in 0..point.fields.len() {
             for (i, fixed) in self.fixed[node].iter().enumerate() {
@@ -214,18 +218,21 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         self.carry(point);
     }
 
-    /// The least of how far the ribs are from crossing; negative infinity where one would leave through a bend.
-    pub fn least_slack(&self, point: &BeltPoint<F>) -> f64 {
+    /// The least slack of the ribs against crossing; negative infinity where a rib would leave through a bend.
+    pub(crate) fn least_slack(&self, point: &BeltPoint<F>) -> f64 {
         if self.rib_leaves_through_bend(point) {
             return f64::NEG_INFINITY;
         }
         self.elements()
-            .flat_map(|(k, element)| element.strips().slacks(slopes_of(&point.fields, k)))
+            .flat_map(|(k, element)| {
+                let bounds = self.bounds(k, element);
+                bounds.slacks(slopes_of(&point.fields, k))
+            })
             .fold(f64::INFINITY, f64::min)
     }
 
-    /// By how much a shape misses its supports, lengths in U and angles in rad.
-    pub fn miss_of_supports(&self, point: &BeltPoint<F>) -> f64 {
+    /// Greatest residual of a shape's supports, lengths in U and angles in rad.
+    pub(crate) fn miss_of_supports(&self, point: &BeltPoint<F>) -> f64 {
         let miss = |support: &NodeSupport| support.value(&point.poses[support.node]).norm();
         self.supports.iter().map(miss).sum()
     }
@@ -236,12 +243,12 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
     }
 
     /// The rib slope of a node, where it is prescribed.
-    pub fn fixed_slope(&self, node: usize) -> Option<f64> {
+    pub(crate) fn fixed_slope(&self, node: usize) -> Option<f64> {
         self.fixed[node][1]
     }
 
-    /// The elements that bend, each with its number among the pieces.
-    pub fn elements(&self) -> impl Iterator<Item = (usize, &Element)> {
+    /// The flexible elements, each with its number among the pieces.
+    pub(crate) fn elements(&self) -> impl Iterator<Item = (usize, &Element)> {
         self.pieces
             .iter()
             .enumerate()
@@ -251,8 +258,16 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
             })
     }
 
+    /// The inequalities that keep the ribs of an element apart; `k` is the element's number among the pieces.
+    pub(crate) fn bounds(&self, k: usize, element: &Element) -> RibBounds<'_> {
+        RibBounds {
+            strips: element.strips(),
+            edges: &self.edges[k],
+        }
+    }
+
     /// Arc length of every node, in U.
-    pub fn nodes(&self) -> Vec<f64> {
+    pub(crate) fn nodes(&self) -> Vec<f64> {
         let mut u = 0.0;
         let mut nodes = vec![u];
         for piece in &self.pieces {
@@ -264,7 +279,7 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
     }
 
     /// Bending energy of a shape.
-    pub fn elastic_energy(&self, fields: &[SVector<f64, F>]) -> f64 {
+    pub(crate) fn elastic_energy(&self, fields: &[SVector<f64, F>]) -> f64 {
         let energy = |(k, element): (usize, &Element)| {
             self.model.energy(element, [&fields[k], &fields[k + 1]])
         };
@@ -272,7 +287,7 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
     }
 
     /// Potential of weight and loads.
-    pub fn load_potential(&self, poses: &[Pose]) -> f64 {
+    pub(crate) fn load_potential(&self, poses: &[Pose]) -> f64 {
         let loads = self.loads.iter();
         let dead: f64 = loads
             .map(|load| load.load.potential(&poses[load.node]))
@@ -288,7 +303,7 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
     }
 
     /// Whether weight or dead forces act.
-    pub fn is_loaded(&self) -> bool {
+    pub(crate) fn is_loaded(&self) -> bool {
         !self.is_weightless() || !self.loads.is_empty()
     }
 
@@ -297,7 +312,7 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
     }
 
     /// Carries the poses on from the first, Eq. (3).
-    pub fn carry(&self, point: &mut BeltPoint<F>) {
+    pub(crate) fn carry(&self, point: &mut BeltPoint<F>) {
         let mut motions = D::Motions::default();
         let mut pose = point.poses[0];
         for (pieces, from) in self.pieces.chunks(LANES).zip((0..).step_by(LANES)) {
@@ -315,14 +330,15 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         }
     }
 
-    /// Derivatives of all work by the twist of the belt from each node on: what acts at it and beyond.
+    /// Derivatives of all work by the twist of the belt from each node on: the wrench of the loads and supports at the node
+    /// and beyond.
     ///
-    /// A wrench about the origin is the same all along the belt but where something acts.
+    /// A wrench about the origin changes along the belt only where loads or supports act.
     fn wrenches(&self, point: &BeltPoint<F>, multipliers: &[f64], into: &mut [NodeVector<N>]) {
         for (i, support) in self.supports.iter().enumerate() {
             let rows = rows_of(multipliers, i);
-            let pull = support.jacobian(&point.poses[support.node]).tr_mul(&rows);
-            add_wrench(&mut into[support.node], &pull);
+            let force = support.jacobian(&point.poses[support.node]).tr_mul(&rows);
+            add_wrench(&mut into[support.node], &force);
         }
         for (i, link) in self.links.iter().enumerate() {
             let rows = rows_of(multipliers, self.supports.len() + i);
@@ -332,7 +348,7 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         }
         let mut add = |node: usize, load: &DeadForce| {
             let mut wrench = into[node].fixed_rows_mut::<6>(0);
-            wrench += load.pull(&point.poses[node]);
+            wrench += load.generalised_force(&point.poses[node]);
         };
         self.for_each_load(&mut add);
         for k in (0..self.pieces.len()).rev() {
@@ -356,9 +372,9 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         }
     }
 
-    /// Force and moment at every node, world axes: what the belt beyond does to the part before; at the last node,
-    /// what holds and loads it.
-    pub fn internal(
+    /// Internal force and moment at every node, world axes: the action of the belt beyond on the part before; at the last
+    /// node, the action of its support and loads.
+    pub(crate) fn internal(
         &self,
         point: &BeltPoint<F>,
         multipliers: &[f64],
@@ -368,8 +384,10 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         self.wrenches(point, multipliers, &mut wrenches);
         let at = |k: usize| {
             let beyond: Vector6<f64> = match wrenches.get(k + 1) {
-                Some(beyond) => beyond.fixed_rows::<6>(0) + self.pull_of_weight(k, 0, point),
-                None => wrenches[last].fixed_rows::<6>(0) - self.pull_of_weight(last - 1, 1, point),
+                Some(beyond) => beyond.fixed_rows::<6>(0) + self.force_of_weight(k, 0, point),
+                None => {
+                    wrenches[last].fixed_rows::<6>(0) - self.force_of_weight(last - 1, 1, point)
+                }
             };
             let (force, moment) = (beyond.fixed_rows::<3>(0), beyond.fixed_rows::<3>(3));
             let about_node = moment - point.poses[k].position.cross(&force);
@@ -378,14 +396,14 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         (0..=last).map(at).collect()
     }
 
-    /// Pull of the share of a piece's weight that acts at its first node, 0, or its second, 1.
-    fn pull_of_weight(&self, piece: usize, end: usize, point: &BeltPoint<F>) -> Vector6<f64> {
+    /// Generalised force of a piece's weight at its first node, 0, or its second, 1: the gradient of its potential.
+    fn force_of_weight(&self, piece: usize, end: usize, point: &BeltPoint<F>) -> Vector6<f64> {
         let shares = load::weight(&self.weight, self.pieces[piece].length());
-        shares[end].pull(&point.poses[piece + end])
+        shares[end].generalised_force(&point.poses[piece + end])
     }
 
     /// Moves a support that holds a node by position and frame.
-    pub fn move_support(&mut self, support: usize, pose: &Pose) {
+    pub(crate) fn move_support(&mut self, support: usize, pose: &Pose) {
         let [x, y, z] = pose.position.into();
         let frame =
             UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(pose.frame));
@@ -409,7 +427,7 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
     }
 
     /// Force of every link on its second node, world axes; on the first it is the opposite.
-    pub fn link_forces(&self, multipliers: &[f64]) -> Vec<Vector3<f64>> {
+    pub(crate) fn link_forces(&self, multipliers: &[f64]) -> Vec<Vector3<f64>> {
         let links = (0..self.links.len()).map(|i| self.supports.len() + i);
         links
             .map(|place| -rows_of(multipliers, place).fixed_rows::<3>(0).into_owned())

@@ -1,4 +1,4 @@
-//! Whether the belt is long enough for what its supports and links ask.
+//! The reach of the belt: whether it is long enough for its supports and links.
 
 use super::Problem;
 use crate::scenario::{BeltSpec, LinkSpec, Scenario, SupportSpec};
@@ -16,7 +16,7 @@ pub struct OutOfReach {
     pub belt: f64,
 }
 
-/// One line: who holds what, by how much too far apart, and what to do.
+/// One line: the supports or the link, the missing length, and the remedy.
 impl fmt::Display for OutOfReach {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
@@ -32,7 +32,7 @@ impl fmt::Display for OutOfReach {
 
 impl Problem {
     /// The first two points that are held too far apart for the belt between them; `None` where there are none.
-    pub fn unreachable_supports(&self) -> Option<OutOfReach> {
+    pub(crate) fn unreachable_supports(&self) -> Option<OutOfReach> {
         let too_long = Span::all(&self.scenario).find(|span| span.excess() > span.rounding)?;
         Some(OutOfReach {
             held: too_long.held,
@@ -41,8 +41,10 @@ impl Problem {
         })
     }
 
-    /// Whether two points are held so far apart that the belt between them has no slack to determine its reactions.
+    /// Whether two points are held so far apart that the belt between them is at its inextensible limit: its reactions are
+    /// undetermined.
     pub(crate) fn has_no_slack(&self) -> bool {
+        /// Slack of the belt between two held points below which reactions are undetermined, as a share of its length.
         const SLACK: f64 = 1e-6;
         Span::all(&self.scenario).any(|span| span.belt > 0.0 && span.excess() > -SLACK * span.belt)
     }
@@ -50,17 +52,17 @@ impl Problem {
 
 /// Two points of the belt that are held at a distance from each other.
 struct Span {
-    /// Who holds them, and where.
+    /// The supports or the link that hold the two points, and their places.
     held: String,
     distance: f64,
     /// The belt between them.
     belt: f64,
-    /// What rounding may do to the distance.
+    /// Rounding error of the distance.
     rounding: f64,
 }
 
 impl Span {
-    /// Supports that follow each other, all round a closed belt, and the ends of links.
+    /// The spans between supports that follow each other, all round a closed belt, and between the ends of links.
     fn all(scenario: &Scenario) -> impl Iterator<Item = Self> {
         let (belt, supports) = (&scenario.belt, &scenario.supports);
         let count = supports.len();
@@ -75,7 +77,7 @@ impl Span {
             .chain(links.map(|(i, link)| Self::of_link(i, link, belt)))
     }
 
-    /// Between two supports, along the axes that both hold.
+    /// The span between two supports, along the axes that both hold.
     fn between([i, j]: [usize; 2], supports: &[SupportSpec], belt: &BeltSpec) -> Self {
         let length = belt.length();
         let [x, x_next] = [i, j].map(|k| supports[k].components());
@@ -107,7 +109,7 @@ impl Span {
         }
     }
 
-    /// By how much the distance exceeds the belt in between.
+    /// Excess of the distance over the length of belt in between.
     fn excess(&self) -> f64 {
         self.distance - self.belt
     }
@@ -122,7 +124,7 @@ fn belt_between(u: [f64; 2], belt: &BeltSpec) -> f64 {
     }
 }
 
-/// A number for people, six decimals or the exponent that it needs.
+/// A number as printed: six decimals, or an exponent where these show too few digits.
 pub(crate) fn number(value: f64) -> String {
     if value == 0.0 || (1e-3..1e6).contains(&value.abs()) {
         let text = format!("{value:.6}");

@@ -28,7 +28,7 @@ fn problem() -> Problem {
 }
 
 #[test]
-fn test_what_no_scenario_may_be_is_no_problem() {
+fn test_invalid_scenarios_are_no_problem() {
     type Spoil = fn(&mut Scenario);
     let cases: [(&str, Spoil); 20] = [
         ("belt.width", |s| s.belt.width = -0.1),
@@ -161,7 +161,7 @@ fn test_clamp_holds_all_of_a_pose() {
 }
 
 #[test]
-fn test_supports_out_of_reach_are_named_with_what_is_missing() {
+fn test_supports_out_of_reach_are_named_with_the_missing_length() {
     assert_eq!(problem().unreachable_supports(), None);
     let pose = Pose {
         frame: exp(&(PI * Vector3::x())),

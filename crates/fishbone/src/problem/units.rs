@@ -4,17 +4,17 @@ use crate::geometry::Wrench;
 use crate::problem::belt::Belt;
 use nalgebra::Vector3;
 
-/// Units of length and energy of a programme, in those of its scenario.
+/// Units of length and energy of a programme, in the units of its scenario.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Units {
     /// The length U of the belt.
     pub length: f64,
-    /// The mean of the rigidity R_f over what bends, over U.
+    /// The mean of the rigidity R_f over the flexible strips, over U.
     pub energy: f64,
 }
 
 impl Units {
-    /// Those of the programmes of a belt.
+    /// The units of the programmes of a belt.
     pub(super) fn of(belt: &Belt) -> Self {
         Self {
             length: belt.length(),
@@ -23,7 +23,7 @@ impl Units {
     }
 
     /// The unit of force: energy over length.
-    pub fn force(&self) -> f64 {
+    pub(crate) fn force(&self) -> f64 {
         self.energy / self.length
     }
 

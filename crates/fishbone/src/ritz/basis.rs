@@ -4,10 +4,10 @@ use nalgebra::DMatrix;
 use num_dual::{DualNum, first_derivative};
 use std::f64::consts::PI;
 
-/// Unknown functions, in the order of the coefficients: φ, θ, ψ, β.
+/// Unknown functions φ, θ, ψ, β, in the order of the coefficients; a number.
 pub(super) const FIELDS: usize = 4;
 
-/// Local variables: value and u-derivative of each unknown function.
+/// Local variables, the value and u-derivative of each unknown function; a number.
 pub(super) const LOCALS: usize = 2 * FIELDS;
 
 /// Basis function e_k at u, counted from 1.
@@ -54,7 +54,7 @@ pub(super) fn gauss_legendre(count: usize) -> Vec<(f64, f64)> {
 /// Node i and its weight, from Newton's method on the Legendre polynomial.
 fn gauss_node(count: usize, i: usize) -> (f64, f64) {
     let mut x = -(PI * (i as f64 + 0.75) / (count as f64 + 0.5)).cos();
-    // Tricomi's guess is close enough for quadratic convergence from the start.
+    // Tricomi's approximation is close enough for quadratic convergence at once.
     for _ in 0..6 {
         let (value, slope) = legendre(count, x);
         x -= value / slope;

@@ -1,4 +1,4 @@
-//! The source's own method, in the terms of an equilibrium.
+//! The source's own method, its result reported as an equilibrium.
 
 use crate::equilibrium::{Equilibrium, Status};
 use crate::geometry::{Pose, exp, log};

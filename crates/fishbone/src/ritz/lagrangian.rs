@@ -11,23 +11,28 @@ use nalgebra::{DMatrix, DVector, SMatrix};
 use num_dual::hessian;
 use std::ops::Range;
 
-/// Rows of the energy, the end position, the start and the end; the rows of the ribs follow.
+/// Row of the energy, an index.
 const ENERGY: usize = 0;
+/// First row of the end position, an index.
 const POSITION: usize = 1;
+/// First row of the start's clamp, an index.
 const START: usize = 4;
+/// First row of the end's clamp, an index.
 const END: usize = 8;
+/// First row of the collocated conditions of the ribs, an index.
 const RIBS: usize = 12;
 
 /// Least penalty factor of the clamps, in R_f/U: well above the belt's own stiffness, for their multipliers to settle.
 const CLAMP_PENALTY: f64 = 1e5;
 
-/// Penalty factor of the clamps over that of the ribs: conditions that can be met stand above those that cannot.
+/// Penalty factor of the clamps over that of the ribs: conditions that can be met rank above conditions that cannot.
+/// Dimensionless.
 const CLAMP_PRIORITY: f64 = 100.0;
 
-/// Quantities of a site.
+/// Quantities of a site, a number.
 const QUANTITIES: usize = 4;
 
-/// What is asked at a site.
+/// Kind of a site: the quantities taken there.
 enum Kind {
     /// Quadrature point of this weight: tangent and energy density, Eq. (3), (34).
     Arc(f64),
@@ -39,7 +44,7 @@ enum Kind {
     Rib,
 }
 
-/// A point of the spine and what is asked there.
+/// A point of the spine, with the kind and the rows of its quantities.
 struct Site {
     kind: Kind,
     localiser: DMatrix<f64>,
@@ -52,7 +57,7 @@ impl Site {
     }
 }
 
-/// How a row enters the augmented Lagrangian.
+/// Kind of a row in the augmented Lagrangian.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Row {
     Energy,
@@ -70,9 +75,9 @@ fn row(index: usize) -> Row {
 
 /// The augmented Lagrangian of Hestenes, Powell and, for inequalities, Rockafellar.
 ///
-/// The source does not say how it weighs its conditions against each other. Here the clamps, which can be met, are
-/// held by their own stiffer penalty and multipliers; the penalty and the updates asked for act on Eq. (25), (32)
-/// and (33), which cannot.
+/// The source does not state how it weighs its conditions against each other. Here the clamps, which can be met, have their
+/// own stiffer penalty and multipliers; the penalty and the updates of the options act on Eq. (25), (32) and (33), which
+/// cannot be met.
 ///
 /// Source: Sec. III-A, reference [14]
 pub(super) struct Lagrangian<'a> {
@@ -83,7 +88,7 @@ pub(super) struct Lagrangian<'a> {
 }
 
 impl<'a> Lagrangian<'a> {
-    /// With all multipliers zero.
+    /// The Lagrangian with all multipliers zero.
     pub(super) fn new(problem: &'a Problem, options: &Options) -> Self {
         Self {
             problem,
@@ -93,12 +98,12 @@ impl<'a> Lagrangian<'a> {
         }
     }
 
-    /// Moves the multipliers of the clamps to what the penalty makes of them at these coefficients.
+    /// Updates the multipliers of the clamps by the penalty's forces at these coefficients.
     pub(super) fn update_clamps(&mut self, coefficients: &DVector<f64>) {
         self.update(POSITION..RIBS, coefficients);
     }
 
-    /// The same for the multipliers of Eq. (25), (32) and (33).
+    /// Updates the multipliers of Eq. (25), (32) and (33) likewise.
     pub(super) fn update_ribs(&mut self, coefficients: &DVector<f64>) {
         self.update(RIBS..self.multipliers.len(), coefficients);
     }
@@ -120,7 +125,7 @@ impl<'a> Lagrangian<'a> {
         self.rows(coefficients)[ENERGY]
     }
 
-    /// How far the conditions are from being met.
+    /// Violation of the conditions.
     pub(super) fn violation(&self, coefficients: &DVector<f64>) -> Violation {
         let rows = self.rows(coefficients);
         let ribs = |quantity: usize| rows.iter().skip(RIBS + quantity).step_by(QUANTITIES);
@@ -135,7 +140,7 @@ impl<'a> Lagrangian<'a> {
         }
     }
 
-    /// Every row: the energy, what equalities miss, what inequalities exceed.
+    /// Every row: the energy, the residuals of equalities, the excess of inequalities.
     fn rows(&self, coefficients: &DVector<f64>) -> DVector<f64> {
         let mut rows = DVector::zeros(self.multipliers.len());
         for site in &self.sites {
@@ -170,7 +175,7 @@ impl<'a> Lagrangian<'a> {
         [tangent[0], tangent[1], tangent[2], density]
     }
 
-    /// What Eq. (25) and (32) miss and Eq. (33) exceeds.
+    /// Residuals of Eq. (25) and (32), excess of Eq. (33).
     fn rib<D: Scalar>(&self, q: &Local<D>) -> [D; QUANTITIES] {
         let [geodesic, torsion, bend] = rates(q);
         let bound = 2.0 / self.problem.width_over_length;
@@ -212,7 +217,7 @@ impl<'a> Lagrangian<'a> {
         }
     }
 
-    /// What a row adds to the augmented Lagrangian.
+    /// The term of a row in the augmented Lagrangian.
     fn term(&self, index: usize, value: f64) -> f64 {
         let (force, multiplier) = (self.force(index, value), self.multipliers[index]);
         match row(index) {
@@ -239,7 +244,7 @@ impl<'a> Lagrangian<'a> {
         (jacobian, curvature)
     }
 
-    /// Adds a site's share of the Jacobian; returns its weighted Hessian in the local variables.
+    /// Adds a site's share of the Jacobian; returns the site's weighted Hessian in the local variables.
     fn expand(
         &self,
         site: &Site,
@@ -333,7 +338,7 @@ mod tests {
         }
     }
 
-    /// A Lagrangian with every multiplier at work, and coefficients whose ribs cross at some of the points.
+    /// A Lagrangian with no multiplier zero, and coefficients whose ribs cross at some of the points.
     fn busy(problem: &Problem) -> (Lagrangian<'_>, DVector<f64>) {
         let mut lagrangian = Lagrangian::new(problem, &options(10));
         lagrangian.multipliers = scattered(lagrangian.multipliers.len(), 3.0);
@@ -502,7 +507,7 @@ mod tests {
         let [first, second] = examples();
         let natural = [0.0; 3];
         let tilted = [-FRAC_PI_2, FRAC_PI_6, FRAC_PI_2];
-        // Twice the basis has room for all of the equations, and so tells how many are independent.
+        // Twice the basis has room for all of the equations, so that the rank is the number of independent ones.
         assert_eq!(rank(&first, 20, natural), 41);
         assert_eq!(rank(&second, 20, tilted), 42);
         assert_eq!(rank(&first, 10, natural), 40);
@@ -510,13 +515,13 @@ mod tests {
     }
 
     #[test]
-    fn mirror_twins_have_the_same_value() {
+    fn mirror_images_have_the_same_value() {
         let [problem, _] = examples();
         let mirrored = Problem {
             bulge: Side::Minus,
             ..problem.clone()
         };
-        let (lagrangian, twin) = (
+        let (lagrangian, mirrored) = (
             Lagrangian::new(&problem, &options(10)),
             Lagrangian::new(&mirrored, &options(10)),
         );
@@ -525,7 +530,7 @@ mod tests {
         reflected.rows_range_mut(30..).neg_mut();
         assert_relative_eq!(
             lagrangian.value(&x),
-            twin.value(&reflected),
+            mirrored.value(&reflected),
             max_relative = 1e-13
         );
     }

@@ -1,8 +1,9 @@
-//! What the unknown functions mean at one point: rates, frame, energy density.
+//! Rates, frame and energy density at one point, from the unknown functions.
 
 use super::Orientation;
 use super::basis::LOCALS;
-use crate::strip::developable::{Curl, EnergyModel};
+use crate::strip::developable::EnergyModel;
+use crate::strip::element::Curl;
 use crate::strip::ribs::Across;
 use nalgebra::{Matrix3, SVector};
 use num_dual::DualNum;
@@ -56,9 +57,9 @@ pub(super) fn density<D: Scalar>(energy: EnergyModel, width: f64, q: &Local<D>) 
     energy.value(rates(q)[2], q[6], &Curl::<f64>::default(), &across)
 }
 
-/// The three equations that hold where the orientation is the one prescribed.
+/// The three residuals that vanish where the orientation is the prescribed one.
 ///
-/// For a frame R₁ they are twice the Rodrigues vector of R₁ᵀA: the rotation vector to first order, rational, and
+/// For a frame R₁ the residuals are twice the Rodrigues vector of R₁ᵀA: the rotation vector to first order, rational, and
 /// without the half-turns that the skew part of R₁ᵀA admits.
 ///
 /// Units: rad.
@@ -81,6 +82,7 @@ mod tests {
     use nalgebra::Vector3;
     use num_dual::Dual64;
 
+    /// Local variables in general position, in rad, rad/U, dimensionless and 1/U.
     const LOCAL: [f64; LOCALS] = [0.3, -0.7, 0.9, 1.1, -0.4, 0.6, 0.5, 2.0];
 
     #[test]

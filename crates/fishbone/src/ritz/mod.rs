@@ -1,13 +1,12 @@
 //! The source's own method: Ritz's method in Eulerian angles with the multiplier method, for one straight belt
 //! clamped at both ends.
 //!
-//! It is here to show what the source computes, and is not the way to an accurate shape. Four functions stand for
+//! The method is kept to show the results of the source, and does not lead to an accurate shape. Four functions stand for
 //! two free ones, so Eq. (25) and (32) are constraints; with the source's numbers 43 equations, 41 or 42 of them
-//! independent, meet 40 coefficients, and no exact solution exists. What comes out is a compromise that the penalty
-//! and the start choose, and [`Violation`] says how far it is from the belt that was asked for: at the points, where
-//! the method looks, and along the belt in between, where the examples miss Eq. (25) by some tens of times more. There
-//! is no status "converged", and with multiplier updates or high penalties the last bits of the input can decide
-//! which of many compromises comes out.
+//! independent, meet 40 coefficients, and no exact solution exists. The result is a compromise that depends on the penalty
+//! and the start. [`Violation`] reports its residuals: at the collocation points, and along the belt in between, where the
+//! examples miss Eq. (25) by some tens of times more. There is no status "converged", and with multiplier updates or high
+//! penalties the last bits of the input can decide between many compromises.
 //!
 //! Lengths are in U, energies in R_f/U, and the start frame is the coordinate system.
 //!
@@ -30,7 +29,7 @@ use std::f64::consts::PI;
 use std::iter::successors;
 use std::ops::ControlFlow;
 
-/// Which of two mirror twins the automatic start leans to.
+/// The one of two mirror images to which the automatic start leans.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Side {
     /// Towards +ξ of the start frame.
@@ -61,11 +60,11 @@ pub enum Orientation {
 impl Orientation {
     /// The form in which the source prescribes this frame: the angles where it is the natural one, else the frame.
     ///
-    /// At the natural frame the angles are singular, and φ = θ = ψ = 0 asks for more than the frame does: φ could go
-    /// on to ±π while ψ makes up for it.
+    /// At the natural frame the angles are singular, and φ = θ = ψ = 0 is more than the frame requires: φ could go on to ±π,
+    /// compensated by ψ.
     ///
     /// Source: Eq. (46), (49)
-    pub fn as_in_source(frame: &Matrix3<f64>) -> Self {
+    pub(crate) fn as_in_source(frame: &Matrix3<f64>) -> Self {
         if (frame - Matrix3::identity()).amax() < 1e-12 {
             return Self::Angles([0.0; 3]);
         }
@@ -73,7 +72,7 @@ impl Orientation {
     }
 }
 
-/// What is to be solved.
+/// The boundary value problem of the method.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Problem {
     /// Width over length, V/U.
@@ -88,15 +87,15 @@ pub struct Problem {
     pub bulge: Side,
 }
 
-/// How it is solved.
+/// Numbers of the method.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
     /// Basis functions for each of φ, θ, ψ, β; at least 6.
     pub basis: usize,
-    /// Collocation points of Eq. (25), (32), (33); at least 2. Too few for the basis leave the belt free to break
-    /// the conditions in between: see [`Solution::violation_along`].
+    /// Collocation points of Eq. (25), (32), (33); at least 2. With too few points for the basis the belt may break the
+    /// conditions in between: see [`Solution::violation_along`].
     pub points: usize,
-    /// Penalty factor ρ of Eq. (25), (32), (33): one missed by g at a point costs ρ g²/2. Positive.
+    /// Penalty factor ρ of Eq. (25), (32), (33): a residual g at a point costs ρ g²/2. Positive.
     pub penalty: f64,
     /// Multiplier updates; 0 is the plain penalty method.
     pub updates: usize,
@@ -114,13 +113,13 @@ impl From<&RitzSpec> for Options {
 }
 
 impl Default for Options {
-    /// The source's numbers, and the penalty at which its printed shapes come out.
+    /// The source's numbers, and the penalty that reproduces its printed shapes.
     fn default() -> Self {
         Self::from(&RitzSpec::default())
     }
 }
 
-/// By how much the conditions are missed: max-norms.
+/// Residuals of the conditions, as max-norms.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Violation {
     /// Eq. (44)–(50): position in U, orientation in rad, rib slope.
@@ -135,7 +134,7 @@ pub struct Violation {
 
 impl Violation {
     /// The largest of all.
-    pub fn max(&self) -> f64 {
+    pub(crate) fn max(&self) -> f64 {
         [
             self.geometric,
             self.geodesic,
@@ -156,9 +155,9 @@ pub struct Solution {
     pub coefficients: DMatrix<f64>,
     /// Elastic energy, Eq. (34).
     pub energy: f64,
-    /// By how much the conditions are missed at the collocation points, where the method asks for them.
+    /// Residuals at the collocation points, where the method imposes the conditions.
     pub violation: Violation,
-    /// By how much they are missed along the whole belt.
+    /// Residuals along the whole belt.
     pub violation_along: Violation,
     /// Penalty factor used.
     pub penalty: f64,
@@ -168,7 +167,7 @@ pub struct Solution {
     pub stationarity: f64,
     /// Newton iterations of all inner minimisations.
     pub iterations: usize,
-    /// Whether the last inner minimisation met its gradient tolerance. It says nothing of the violation.
+    /// Whether the last inner minimisation met its gradient tolerance, whatever the violation.
     pub stationary: bool,
     /// Whether the caller, or the budget of iterations, cut the solve short.
     pub cut_short: bool,
@@ -176,12 +175,12 @@ pub struct Solution {
 
 impl Solution {
     /// Eulerian angles φ, θ, ψ at u.
-    pub fn euler(&self, u: f64) -> [f64; 3] {
+    pub(crate) fn euler(&self, u: f64) -> [f64; 3] {
         local::euler(&self.local(u))
     }
 
     /// Rib slope β at u.
-    pub fn rib_slope(&self, u: f64) -> f64 {
+    pub(crate) fn rib_slope(&self, u: f64) -> f64 {
         self.local(u)[6]
     }
 
@@ -189,21 +188,21 @@ impl Solution {
     ///
     /// Units: rad/U.
     /// Source: Eq. (4)
-    pub fn rates(&self, u: f64) -> Vector3<f64> {
+    pub(crate) fn rates(&self, u: f64) -> Vector3<f64> {
         local::rates(&self.local(u)).into()
     }
 
     /// Frame [ξ η ζ] at u.
     ///
     /// Source: Eq. (1), (2)
-    pub fn frame(&self, u: f64) -> Matrix3<f64> {
+    pub(crate) fn frame(&self, u: f64) -> Matrix3<f64> {
         local::frame(self.euler(u))
     }
 
     /// Positions of the spine at each of `u`.
     ///
     /// Source: Eq. (3)
-    pub fn positions(&self, u: &[f64]) -> Vec<Vector3<f64>> {
+    pub(crate) fn positions(&self, u: &[f64]) -> Vec<Vector3<f64>> {
         let rule = quadrature(self.coefficients.nrows());
         let tangent = |u: f64| self.frame(u).column(1).into_owned();
         let position = |&u: &f64| rule.iter().map(|(s, w)| tangent(u * s) * (u * w)).sum();
@@ -217,24 +216,24 @@ impl Solution {
     }
 }
 
-/// Iterations after which an inner minimisation is given up.
+/// Iterations after which an inner minimisation is given up, a number.
 const ITERATION_LIMIT: usize = 2000;
 
-/// Violation of the clamps at which their multipliers are left.
+/// Violation of the clamps at which their multipliers are no longer updated, in U, rad and a number.
 const CLAMP_TOLERANCE: f64 = 1e-8;
 
-/// Updates of the clamps' multipliers after which they are left in any case.
+/// Updates of the clamps' multipliers, the greatest count, a number.
 const CLAMP_UPDATES: usize = 50;
 
-/// The penalty from which the automatic start climbs.
+/// Penalty from which the automatic start climbs, in R_f/U.
 const SOFTEST_PENALTY: f64 = 0.1;
 
-/// Iterations over all stages and updates after which a solve is cut short.
+/// Iterations over all stages and updates after which a solve is cut short, a number.
 const BUDGET: usize = 10_000;
 
-/// Solves from the automatic start, with the penalty climbing to the one asked for by decades.
+/// Solves from the automatic start, with the penalty climbing by decades to the penalty of the options.
 ///
-/// Thrown straight at a high penalty the method locks near wherever it starts; climbing, it locks later.
+/// At once at a high penalty the method locks near its start; climbing, it locks later.
 ///
 /// Panics: on options out of their ranges.
 pub fn solve(
@@ -275,7 +274,7 @@ pub fn solve(
     }
 }
 
-/// The penalties on the way to the one asked for.
+/// The penalties on the way to a given penalty.
 fn climb(penalty: f64) -> impl Iterator<Item = f64> {
     let decades = successors(Some(SOFTEST_PENALTY), |softer| Some(10.0 * softer));
     // A decade that rounding leaves just below the goal is the goal.
@@ -343,7 +342,7 @@ fn clamped(
     minimum
 }
 
-/// Points at which the conditions are looked at to know their violation along the whole belt.
+/// Points at which the violation along the whole belt is evaluated, a number.
 const DENSE: usize = 601;
 
 fn solution(problem: &Problem, options: &Options, updates: usize, minimum: Minimum) -> Solution {
@@ -368,12 +367,13 @@ fn solution(problem: &Problem, options: &Options, updates: usize, minimum: Minim
 
 /// Coefficients of the automatic start: an arch of the right span, on top of a uniform turn towards the end's frame.
 ///
-/// With θ = 0 all along, φ and ψ would do the same thing and the Hessian be singular; so the arch leans a little.
+/// With θ = 0 all along, φ and ψ would be the same turn and the Hessian singular; so the arch leans a little.
 ///
 /// Shapes: (n, 4).
 ///
 /// Panics: on options out of their ranges.
-pub fn start(problem: &Problem, options: &Options) -> DMatrix<f64> {
+pub(crate) fn start(problem: &Problem, options: &Options) -> DMatrix<f64> {
+    /// Lean of the arch out of its plane, in rad.
     const LEAN: f64 = 0.1;
     check(options);
     let turn = turn(problem);
@@ -390,15 +390,17 @@ pub fn start(problem: &Problem, options: &Options) -> DMatrix<f64> {
     coefficients
 }
 
-/// Rows of the coefficients of 1, u and sin 2πu, which cos 2πu follows.
+/// Row of the coefficients of 1, an index.
 const CONSTANT: usize = 0;
+/// Row of the coefficients of u, an index.
 const LINEAR: usize = 1;
+/// Row of the coefficients of sin 2πu, which the row of cos 2πu follows; an index.
 const WAVE: usize = 4;
 
 /// Eulerian angles of the end to start from.
 ///
-/// A turn in the plane where that comes within a right angle of the end's frame, for it bends the belt only; else the
-/// frame's own angles.
+/// A turn in the plane if it is within a right angle of the end's frame, for it bends the belt only; else the frame's own
+/// angles.
 fn turn(problem: &Problem) -> [f64; 3] {
     match &problem.end_orientation {
         Orientation::Angles(angles) => *angles,
@@ -417,7 +419,7 @@ fn turn(problem: &Problem) -> [f64; 3] {
 
 /// Angle about z that turns the start's tangent towards the end's.
 ///
-/// A half-turn can be made either way; it is made towards the end's position.
+/// A half-turn can be made either way; the way towards the end's position is taken.
 fn heading(problem: &Problem, frame: &Matrix3<f64>) -> f64 {
     let heading = (-frame.m12).atan2(frame.m22);
     if PI - heading.abs() > 1e-6 {
@@ -565,13 +567,13 @@ mod tests {
     }
 
     #[test]
-    fn mirror_twins_have_the_same_energy() {
+    fn mirror_images_have_the_same_energy() {
         let [problem, _] = examples();
-        let twin = Problem {
+        let mirrored = Problem {
             bulge: Side::Minus,
             ..problem.clone()
         };
-        let [one, two] = [problem, twin].map(|problem| solved(&problem, &soft()));
+        let [one, two] = [problem, mirrored].map(|problem| solved(&problem, &soft()));
         assert_relative_eq!(one.energy, two.energy, max_relative = 1e-9);
         assert_relative_eq!(peak(&one).x, -peak(&two).x, epsilon = 1e-6);
         assert!(peak(&one).x > 0.3);

@@ -3,7 +3,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use std::ops::ControlFlow;
 
-/// What is minimised.
+/// An objective function.
 pub(super) trait Objective {
     /// Value at x; not finite where undefined.
     fn value(&self, x: &DVector<f64>) -> f64;
@@ -12,7 +12,7 @@ pub(super) trait Objective {
     fn derivatives(&self, x: &DVector<f64>) -> (DVector<f64>, DMatrix<f64>);
 }
 
-/// Where a minimisation ended.
+/// The end of a minimisation.
 pub(super) struct Minimum {
     /// The point.
     pub(super) x: DVector<f64>,
@@ -27,7 +27,7 @@ pub(super) struct Minimum {
 }
 
 impl Minimum {
-    /// Counts the iterations of the minimisation that led here.
+    /// Adds the iterations of the minimisation before this one.
     pub(super) fn after(self, earlier: Self) -> Self {
         Self {
             iterations: earlier.iterations + self.iterations,
@@ -36,10 +36,10 @@ impl Minimum {
     }
 }
 
-/// Share of the predicted decrease below which a step is refused.
+/// Actual decrease below which a step is refused, as a share of the predicted decrease.
 const ACCEPTANCE: f64 = 1e-4;
 
-/// Differences of values below this share of the value are rounding.
+/// Difference of values below which it is rounding, as a share of the value.
 const ROUNDING: f64 = 1e-12;
 
 /// Minimises from `x` until the max-norm of the gradient is at most `tolerance`.
@@ -67,7 +67,7 @@ pub(super) fn minimise(
     }
 }
 
-/// The iterate with all that is known there.
+/// The iterate with its value and derivatives.
 struct State {
     x: DVector<f64>,
     value: f64,
@@ -94,7 +94,7 @@ impl State {
         self.value.is_finite() && self.gradient.amax() <= tolerance
     }
 
-    /// Tries one step; false when no step is left that rounding does not swallow.
+    /// Tries one step; false if every step left is lost in rounding.
     fn advance(&mut self, objective: &impl Objective) -> bool {
         let Some(step) = self.step() else {
             return false;
@@ -116,7 +116,7 @@ impl State {
         true
     }
 
-    /// Where values are too coarse to judge a step by, the gradient judges it.
+    /// Accepts or refuses a step by the gradient, where values are too coarse to judge it.
     fn polish(&mut self, objective: &impl Objective, candidate: DVector<f64>) -> bool {
         let derivatives = objective.derivatives(&candidate);
         let better = derivatives.0.amax() < self.gradient.amax();

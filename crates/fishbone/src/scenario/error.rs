@@ -1,9 +1,9 @@
-//! What can be wrong with a scenario, as data and as one line for people.
+//! Faults of a scenario, as data and as one line for people.
 
 use crate::names::named;
 use thiserror::Error;
 
-/// Why a scenario is refused. Its text is one line: the field, what was found, what is allowed.
+/// The reason why a scenario is refused. Its text is one line: the field, the value found, the values allowed.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum ScenarioError {
@@ -14,7 +14,7 @@ pub enum ScenarioError {
         line: usize,
         /// Column in that line in characters, from 1.
         column: usize,
-        /// What the parser says of it.
+        /// The parser's message.
         message: String,
     },
     /// A field that the schema does not have.
@@ -44,9 +44,9 @@ pub enum ScenarioError {
     Invalid {
         /// Path of the field.
         field: String,
-        /// What was found there.
+        /// The value found.
         found: String,
-        /// What may stand there; completes "must be …".
+        /// The values allowed; completes "must be …".
         allowed: String,
     },
 }
@@ -58,7 +58,7 @@ named!(impl ScenarioError {
     Invalid = "invalid",
 });
 
-/// Longest piece of the input that an error repeats, in characters.
+/// Length of the longest piece of the input that an error repeats, in characters.
 pub(crate) const LONGEST_QUOTE: usize = 60;
 
 impl ScenarioError {

@@ -1,394 +1,31 @@
-//! The scenario schema: what is to be solved, as it stands in a TOML or JSON file. The room `io` reads and writes these.
+//! The scenario schema: the belt problem as it stands in a TOML or JSON file. The room `io` reads and writes scenarios.
 //!
-//! Any consistent set of units serves; SI is assumed in the words below. Angles are in radians.
+//! Any consistent set of units serves; the comments assume SI. Angles are in radians.
 
 pub mod error;
+mod schema;
 mod table;
 mod validate;
 
 use crate::board::material::{Laminate, Layer, Material};
 use crate::geometry::{Euler, exp, frame_from_euler};
-use crate::names::named;
 pub use crate::strip::developable::EnergyModel;
-use table::table;
+pub use schema::{
+    Axis, BeltSpec, Component, LayerSpec, LinkSpec, LoadsSpec, MaterialSpec, Method, Place,
+    PointLoad, Rigidity, RigidityTable, RitzSpec, Scenario, SegmentSpec, SolverSpec, SupportSpec,
+};
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
-/// Two places along the spine closer than this, relative to the length of the belt, are one place: sums of decimal
-/// lengths are not exact.
-pub const SAME_PLACE: f64 = 1e-9;
+/// Distance along the spine below which two places are one, as a share of the belt's length: sums of decimal lengths are not
+/// exact.
+pub(crate) const SAME_PLACE: f64 = 1e-9;
 
-/// Poisson's ratio of a belt that names none.
-pub const DEFAULT_POISSON: f64 = 0.3;
-
-table! {
-    /// A belt, its supports and loads, and how to solve for its shape.
-    ///
-    /// Units: SI (m, N, rad, kg) or any consistent set.
-    #[derive(Debug, Clone, PartialEq)]
-    pub struct Scenario {
-        /// Name for people, as in titles of figures.
-        #[serde(default)]
-        pub name: String,
-        /// Energy model of the bent belt.
-        #[serde(default)]
-        pub energy: EnergyModel,
-        /// The belt itself, in its flat, unloaded state.
-        pub belt: BeltSpec,
-        /// What holds the belt, in the order of `at`. Without any, the start is held in the natural pose.
-        #[serde(default)]
-        pub supports: Vec<SupportSpec>,
-        /// Pairs of spine points held at a fixed offset, Eq. (35).
-        #[serde(default)]
-        #[schemars(length(max = 100))]
-        pub links: Vec<LinkSpec>,
-        /// Gravity and dead forces.
-        #[serde(default)]
-        pub loads: LoadsSpec,
-        /// How to solve.
-        #[serde(default)]
-        pub solver: SolverSpec,
-    }
-}
-
-table! {
-    /// The board that the belt is cut from: width, rigidity, and its segments along the spine.
-    ///
-    /// Its rigidity comes from exactly one of `rigidity`, `material` and `layers`.
-    #[derive(Debug, Clone, PartialEq)]
-    pub struct BeltSpec {
-        /// Width V. Units: m.
-        #[schemars(extend("exclusiveMinimum" = 0))]
-        pub width: f64,
-        /// Flexural rigidity R_f of the whole width. Units: N·m².
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        #[schemars(extend("exclusiveMinimum" = 0))]
-        pub rigidity: Option<f64>,
-        /// One homogeneous sheet, in place of `rigidity`.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        pub material: Option<MaterialSpec>,
-        /// A laminate, in place of `rigidity`: from bottom (−ξ) to top.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        #[schemars(length(min = 1, max = 1000))]
-        pub layers: Option<Vec<LayerSpec>>,
-        /// Poisson's ratio ν, used only where `natural_bend` is not 0; that of a material or layers wins. Default: 0.3.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        #[schemars(extend("exclusiveMinimum" = -1, "exclusiveMaximum" = 0.5))]
-        pub poisson: Option<f64>,
-        /// Bend ω_ζ of the unloaded belt; positive curls towards −ξ. Units: rad/m.
-        #[serde(default)]
-        pub natural_bend: f64,
-        /// Mass per length, lumped on the spine; a material or layers that give it win. Units: kg/m.
-        #[serde(default)]
-        #[schemars(extend("minimum" = 0))]
-        pub density: f64,
-        /// Whether the end joins the start.
-        #[serde(default)]
-        pub closed: bool,
-        /// Signed initial twist of a closed belt, in half turns.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        #[schemars(range(min = -20, max = 20))]
-        pub half_turns: Option<i32>,
-        /// What the belt consists of, in order along the spine.
-        #[schemars(length(min = 1))]
-        pub segments: Vec<SegmentSpec>,
-    }
-}
-
-table! {
-    /// A homogeneous, isotropic sheet.
-    #[derive(Debug, Clone, PartialEq)]
-    pub struct MaterialSpec {
-        /// Name of a known material; `young`, `poisson` and `density` are its own unless given. Units: SI.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        pub preset: Option<String>,
-        /// Young's modulus E. Units: Pa.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        #[schemars(extend("exclusiveMinimum" = 0))]
-        pub young: Option<f64>,
-        /// Poisson's ratio ν.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        #[schemars(extend("exclusiveMinimum" = -1, "exclusiveMaximum" = 0.5))]
-        pub poisson: Option<f64>,
-        /// Thickness t. Units: m.
-        #[schemars(extend("exclusiveMinimum" = 0))]
-        pub thickness: f64,
-        /// Mass per volume. Units: kg/m³.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        #[schemars(extend("minimum" = 0))]
-        pub density: Option<f64>,
-    }
-}
-
-table! {
-    /// One layer of a laminate.
-    #[derive(Debug, Clone, PartialEq)]
-    pub struct LayerSpec {
-        /// Name of a known material. Units: SI.
-        pub material: String,
-        /// Thickness. Units: m.
-        #[schemars(extend("exclusiveMinimum" = 0))]
-        pub thickness: f64,
-    }
-}
-
-/// A stretch of the belt, or a bend of the board between two.
-#[derive(Debug, Clone, PartialEq)]
-#[cfg_attr(
-    feature = "io",
-    derive(serde::Serialize, schemars::JsonSchema),
-    serde(tag = "kind", rename_all = "lowercase", deny_unknown_fields)
-)]
-pub enum SegmentSpec {
-    /// A straight strip.
-    Straight {
-        /// Length along the spine. Units: m.
-        #[cfg_attr(feature = "io", schemars(extend("exclusiveMinimum" = 0)))]
-        length: f64,
-        /// Bend ω_ζ of the unloaded segment, in place of the belt's. Units: rad/m.
-        #[cfg_attr(feature = "io", serde(skip_serializing_if = "Option::is_none"))]
-        natural_bend: Option<f64>,
-        /// Flexural rigidity, in place of the belt's. Units: N·m².
-        #[cfg_attr(feature = "io", serde(skip_serializing_if = "Option::is_none"))]
-        rigidity: Option<Rigidity>,
-    },
-    /// A strip curved in its plane.
-    Arc {
-        /// Length along the spine. Units: m.
-        #[cfg_attr(feature = "io", schemars(extend("exclusiveMinimum" = 0)))]
-        length: f64,
-        /// In-plane (geodesic) curvature; positive turns η towards ζ. Units: rad/m.
-        curvature: f64,
-        /// Bend ω_ζ of the unloaded segment, in place of the belt's. Units: rad/m.
-        #[cfg_attr(feature = "io", serde(skip_serializing_if = "Option::is_none"))]
-        natural_bend: Option<f64>,
-        /// Flexural rigidity, in place of the belt's. Units: N·m².
-        #[cfg_attr(feature = "io", serde(skip_serializing_if = "Option::is_none"))]
-        rigidity: Option<Rigidity>,
-    },
-    /// A bend of the board at a point.
-    Corner {
-        /// Angle, at most 120° in magnitude; positive turns η towards ζ. Units: rad.
-        #[cfg_attr(feature = "io", schemars(range(min = -2.0943951033, max = 2.0943951033)))]
-        angle: f64,
-    },
-    /// A stiffener.
-    Rigid {
-        /// Length along the spine. Units: m.
-        #[cfg_attr(feature = "io", schemars(extend("exclusiveMinimum" = 0)))]
-        length: f64,
-    },
-}
-
-/// Flexural rigidity of a segment: one number, or a table along it.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Rigidity {
-    /// The same everywhere. Units: N·m².
-    Constant(f64),
-    /// Piecewise linear along the segment.
-    Table(RigidityTable),
-}
-
-table! {
-    /// Flexural rigidity, piecewise linear along a segment.
-    ///
-    /// Shapes: `u` and `value` have one length, at least 2.
-    #[derive(Debug, Clone, PartialEq)]
-    pub struct RigidityTable {
-        /// Arc lengths from the start of the segment, rising. Units: m.
-        #[schemars(length(min = 2, max = 10_000))]
-        pub u: Vec<f64>,
-        /// Rigidity at each of them. Units: N·m².
-        #[schemars(length(min = 2, max = 10_000))]
-        pub value: Vec<f64>,
-    }
-}
-
-/// A place along the spine.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Place {
-    /// The start of the belt, u = 0.
-    Start,
-    /// The end of the belt, u = U.
-    End,
-    /// An arc length from the start. Units: m.
-    ArcLength(f64),
-}
-
-/// One component of a support's position.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Component {
-    /// Held at this coordinate. Units: m.
-    Held(f64),
-    /// Free to move.
-    Free,
-}
-
-named! {
-    /// A body axis.
-    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-    pub enum Axis {
-        /// The normal ξ.
-        Xi = "xi",
-        /// The tangent η.
-        Eta = "eta",
-        /// The width direction ζ.
-        Zeta = "zeta",
-    }
-}
-
-table! {
-    /// What holds the belt at one point of its spine.
-    ///
-    /// Its orientation is given by at most one of `rotation`, `euler` and `quaternion`; without any it is free.
-    #[derive(Debug, Clone, PartialEq)]
-    pub struct SupportSpec {
-        /// Where along the spine.
-        pub at: Place,
-        /// Position of the spine point, world axes; leave out for a free position. Shapes: (3,). Units: m.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        pub position: Option<[Component; 3]>,
-        /// Frame as a rotation vector, `R = exp([rotation]×)`, world axes. Shapes: (3,). Units: rad.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        pub rotation: Option<[f64; 3]>,
-        /// Frame as Eulerian angles [φ, θ, ψ], Eq. (1). Shapes: (3,). Units: rad.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        pub euler: Option<[f64; 3]>,
-        /// Frame as a unit quaternion [w, x, y, z]. Shapes: (4,).
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        pub quaternion: Option<[f64; 4]>,
-        /// Body axis about which the held frame is free to turn.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        pub hinge: Option<Axis>,
-        /// Whether the rib is square to the spine, β = 0. Default: at an end with both position and orientation.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        pub square_rib: Option<bool>,
-    }
-}
-
-table! {
-    /// Two spine points held at a fixed offset.
-    ///
-    /// Source: Eq. (35).
-    #[derive(Debug, Clone, PartialEq)]
-    pub struct LinkSpec {
-        /// The point that the offset is counted from.
-        pub from: Place,
-        /// The point at the offset.
-        pub to: Place,
-        /// x(to) − x(from), world axes. Shapes: (3,). Units: m.
-        pub offset: [f64; 3],
-    }
-}
-
-table! {
-    /// Loads that have a potential.
-    #[derive(Debug, Clone, PartialEq, Default)]
-    pub struct LoadsSpec {
-        /// Acceleration of gravity, world axes. Shapes: (3,). Units: m/s².
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        pub gravity: Option<[f64; 3]>,
-        /// Dead forces at points.
-        #[serde(default)]
-        #[schemars(length(max = 10_000))]
-        pub points: Vec<PointLoad>,
-    }
-}
-
-table! {
-    /// A dead force at one point of the spine, or off it at the end of a lever.
-    #[derive(Debug, Clone, PartialEq)]
-    pub struct PointLoad {
-        /// Where along the spine.
-        pub at: Place,
-        /// Force, world axes. Shapes: (3,). Units: N.
-        pub force: [f64; 3],
-        /// From the spine point to where the force acts, body axes. Shapes: (3,). Units: m.
-        #[serde(default)]
-        pub lever: [f64; 3],
-    }
-}
-
-named! {
-    /// The method of solution.
-    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-    pub enum Method {
-        /// Bend and rib slope as the only unknowns.
-        #[default]
-        Intrinsic = "intrinsic",
-        /// The source's own: Ritz's method with Eulerian angles, Eq. (37)–(43).
-        Ritz = "ritz",
-    }
-}
-
-table! {
-    /// How to solve.
-    #[derive(Debug, Clone, PartialEq)]
-    #[serde(default)]
-    pub struct SolverSpec {
-        /// The method of solution.
-        pub method: Method,
-        /// Number of elements in all, shared out by length. Default: 8 U/V, at least 80.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        #[schemars(range(min = 4, max = 100_000))]
-        pub elements: Option<usize>,
-        /// Max-norm of stationarity, constraints and complementarity, with lengths in U and energy in mean R_f/U.
-        #[schemars(range(min = 1e-13, max = 1e-2))]
-        pub tolerance: f64,
-        /// Which of mirror twins to take: the one that bulges along this direction, world axes. Shapes: (3,).
-        pub bulge: [f64; 3],
-        /// Settings of the method `ritz`.
-        pub ritz: RitzSpec,
-    }
-}
-
-impl Default for SolverSpec {
-    fn default() -> Self {
-        Self {
-            method: Method::default(),
-            elements: None,
-            tolerance: 1e-8,
-            bulge: [1.0, 0.0, 0.0],
-            ritz: RitzSpec::default(),
-        }
-    }
-}
-
-table! {
-    /// Settings of the source's own method.
-    ///
-    /// Source: Eq. (37)–(43).
-    #[derive(Debug, Clone, PartialEq)]
-    #[serde(default)]
-    pub struct RitzSpec {
-        /// Number of basis functions of each angle: 1, u, and pairs of a sine and a cosine, Eq. (41)–(43); even.
-        #[schemars(range(min = 6, max = 40), extend("multipleOf" = 2))]
-        pub basis: usize,
-        /// Number of points where Eq. (25) and (32) are collocated.
-        #[schemars(range(min = 2, max = 500))]
-        pub points: usize,
-        /// Penalty on the collocated constraints; the default is that at which the source's printed shapes come out.
-        #[schemars(range(min = 1e-6, max = 1e12))]
-        pub penalty: f64,
-        /// Number of updates of the multipliers; 0 keeps to the penalty alone.
-        #[schemars(range(max = 1000))]
-        pub updates: usize,
-    }
-}
-
-impl Default for RitzSpec {
-    fn default() -> Self {
-        Self {
-            basis: 10,
-            points: 16,
-            penalty: 1e2,
-            updates: 1,
-        }
-    }
-}
+/// Poisson's ratio of a belt that gives none, dimensionless.
+pub(crate) const DEFAULT_POISSON: f64 = 0.3;
 
 impl Scenario {
-    /// A belt that nothing else is said of: a file with the one table `belt`.
+    /// The scenario of a belt alone: a file with the one table `belt`.
     pub fn new(belt: BeltSpec) -> Self {
         Self {
             name: String::new(),
@@ -404,27 +41,27 @@ impl Scenario {
     /// Number of elements: the solver's own, or 8 U/V and at least 80.
     ///
     /// Elements longer than V/4 give false energy levels; V/8 is safe.
-    pub fn elements(&self) -> usize {
+    pub(crate) fn elements(&self) -> usize {
         self.solver
             .elements
             .unwrap_or_else(|| self.default_elements())
     }
 
-    /// Whether the rib at a support is square: as the support says, else at a clamped end; a closed belt has no ends.
-    pub fn is_square_rib(&self, support: &SupportSpec) -> bool {
+    /// Whether the rib at a support is square: as the support states, else at a clamped end; a closed belt has no ends.
+    pub(crate) fn is_square_rib(&self, support: &SupportSpec) -> bool {
         let clamped_end = !self.belt.closed && support.is_square_rib(self.belt.length());
         support.square_rib.unwrap_or(clamped_end)
     }
 
     /// Number of elements where the scenario names none.
-    pub fn default_elements(&self) -> usize {
+    pub(crate) fn default_elements(&self) -> usize {
         default_elements(self.belt.length(), self.belt.width)
     }
 
     /// Arc lengths where elements must meet: both ends, joints of segments, supports, links and point loads.
     ///
     /// Places within [`SAME_PLACE`] of each other are one. Rising from 0 to U. Units: m.
-    pub fn break_points(&self) -> Vec<f64> {
+    pub(crate) fn break_points(&self) -> Vec<f64> {
         let length = self.belt.length();
         let supports = self.supports.iter().map(|support| support.at);
         let links = self.links.iter().flat_map(|link| [link.from, link.to]);
@@ -466,7 +103,7 @@ impl BeltSpec {
     }
 
     /// Length U of the spine. Units: m.
-    pub fn length(&self) -> f64 {
+    pub(crate) fn length(&self) -> f64 {
         self.segments.iter().map(SegmentSpec::length).sum()
     }
 
@@ -479,7 +116,7 @@ impl BeltSpec {
     }
 
     /// Flexural rigidity R_f of a belt that has one rigidity throughout; `None` of any other. Units: N·m².
-    pub fn rigidity_value(&self) -> Option<f64> {
+    pub(crate) fn rigidity_value(&self) -> Option<f64> {
         let own = self.own_rigidity();
         let mut values = self.flexible().map(|segment| match segment.rigidity() {
             Some(Rigidity::Constant(value)) => Some(*value),
@@ -492,26 +129,26 @@ impl BeltSpec {
 
     /// Flexural rigidity R_f of segments that have none of their own, from `rigidity`, the material or the layers.
     /// Units: N·m².
-    pub fn own_rigidity(&self) -> Option<f64> {
+    pub(crate) fn own_rigidity(&self) -> Option<f64> {
         self.rigidity
             .or_else(|| Some(self.laminate()?.rigidity * self.width))
     }
 
     /// Poisson's ratio ν: that of the material or the layers, else `poisson`, else [`DEFAULT_POISSON`].
-    pub fn poisson_value(&self) -> f64 {
+    pub(crate) fn poisson_value(&self) -> f64 {
         let own = self.laminate().map(|laminate| laminate.poisson);
         own.or(self.poisson).unwrap_or(DEFAULT_POISSON)
     }
 
     /// Mass per length of the spine: that of the material or the layers where they give one, else `density`.
     /// Units: kg/m.
-    pub fn density_value(&self) -> f64 {
+    pub(crate) fn density_value(&self) -> f64 {
         let own = self.laminate().and_then(|laminate| laminate.mass);
         own.map_or(self.density, |mass| mass * self.width)
     }
 
     /// Thickness of the sheet or of all layers; `None` where the belt is given by its rigidity.
-    pub fn thickness(&self) -> Option<f64> {
+    pub(crate) fn thickness(&self) -> Option<f64> {
         let sheet = self.material.as_ref().map(|sheet| sheet.thickness);
         let layers = || {
             Some(
@@ -526,7 +163,7 @@ impl BeltSpec {
     }
 
     /// Whether any part of the unloaded belt is bent.
-    pub fn has_natural_bend(&self) -> bool {
+    pub(crate) fn has_natural_bend(&self) -> bool {
         self.segments
             .iter()
             .any(|segment| self.natural_bend_of(segment) != 0.0)
@@ -538,8 +175,8 @@ impl BeltSpec {
         self.segments.iter().all(straight)
     }
 
-    /// Bend ω_ζ of an unloaded segment: its own, else the belt's; 0 of one that does not bend. Units: rad/m.
-    pub fn natural_bend_of(&self, segment: &SegmentSpec) -> f64 {
+    /// Bend ω_ζ of an unloaded segment: its own, else the belt's; 0 of a segment that is not flexible. Units: rad/m.
+    pub(crate) fn natural_bend_of(&self, segment: &SegmentSpec) -> f64 {
         match segment.is_flexible() {
             true => segment.natural_bend().unwrap_or(self.natural_bend),
             false => 0.0,
@@ -595,7 +232,7 @@ impl RigidityTable {
     /// # Panics
     ///
     /// If the table has no entries.
-    pub fn at(&self, u: f64) -> f64 {
+    pub(crate) fn at(&self, u: f64) -> f64 {
         let next = self.u.partition_point(|entry| *entry <= u);
         if next == 0 || next == self.u.len() {
             return self.value[next.saturating_sub(1)];
@@ -616,7 +253,7 @@ impl SegmentSpec {
     }
 
     /// Length along the spine; 0 of a corner. Units: m.
-    pub fn length(&self) -> f64 {
+    pub(crate) fn length(&self) -> f64 {
         match self {
             Self::Straight { length, .. } | Self::Arc { length, .. } | Self::Rigid { length } => {
                 *length
@@ -626,7 +263,7 @@ impl SegmentSpec {
     }
 
     /// In-plane (geodesic) curvature; 0 but of an arc. Units: rad/m.
-    pub fn curvature(&self) -> f64 {
+    pub(crate) fn curvature(&self) -> f64 {
         match self {
             Self::Arc { curvature, .. } => *curvature,
             Self::Straight { .. } | Self::Corner { .. } | Self::Rigid { .. } => 0.0,
@@ -634,7 +271,7 @@ impl SegmentSpec {
     }
 
     /// Angle by which the board turns at a point; 0 but of a corner. Units: rad.
-    pub fn angle(&self) -> f64 {
+    pub(crate) fn angle(&self) -> f64 {
         match self {
             Self::Corner { angle } => *angle,
             Self::Straight { .. } | Self::Arc { .. } | Self::Rigid { .. } => 0.0,
@@ -642,7 +279,7 @@ impl SegmentSpec {
     }
 
     /// The segment's own rigidity, where it has one.
-    pub fn rigidity(&self) -> Option<&Rigidity> {
+    pub(crate) fn rigidity(&self) -> Option<&Rigidity> {
         match self {
             Self::Straight { rigidity, .. } | Self::Arc { rigidity, .. } => rigidity.as_ref(),
             Self::Corner { .. } | Self::Rigid { .. } => None,
@@ -650,7 +287,7 @@ impl SegmentSpec {
     }
 
     /// Bend ω_ζ of the unloaded segment, where it has its own. Units: rad/m.
-    pub fn natural_bend(&self) -> Option<f64> {
+    pub(crate) fn natural_bend(&self) -> Option<f64> {
         match self {
             Self::Straight { natural_bend, .. } | Self::Arc { natural_bend, .. } => *natural_bend,
             Self::Corner { .. } | Self::Rigid { .. } => None,
@@ -658,14 +295,14 @@ impl SegmentSpec {
     }
 
     /// Whether the segment bends at all.
-    pub fn is_flexible(&self) -> bool {
+    pub(crate) fn is_flexible(&self) -> bool {
         matches!(self, Self::Straight { .. } | Self::Arc { .. })
     }
 }
 
 impl Place {
     /// Arc length from the start of a belt of this length; a number within [`SAME_PLACE`] of an end is that end.
-    pub fn arc_length(&self, length: f64) -> f64 {
+    pub(crate) fn arc_length(&self, length: f64) -> f64 {
         match *self {
             Self::Start => 0.0,
             Self::End => length,
@@ -676,14 +313,14 @@ impl Place {
     }
 
     /// Whether this is the start or the end of a belt of this length.
-    pub fn is_end(&self, length: f64) -> bool {
+    pub(crate) fn is_end(&self, length: f64) -> bool {
         let u = self.arc_length(length);
         u == 0.0 || u == length
     }
 }
 
 impl SupportSpec {
-    /// A support at a place, which is still to be told what it holds.
+    /// A support at a place that as yet holds nothing.
     pub fn new(at: Place) -> Self {
         Self {
             at,
@@ -713,7 +350,7 @@ impl SupportSpec {
     }
 
     /// Components of the position that the support holds. Units: m.
-    pub fn components(&self) -> [Option<f64>; 3] {
+    pub(crate) fn components(&self) -> [Option<f64>; 3] {
         self.position.map_or([None; 3], |position| {
             position.map(|component| component.value())
         })
@@ -728,7 +365,7 @@ impl SupportSpec {
     /// Whether the rib is square to the spine, β = 0, on a belt of this length.
     ///
     /// Source: Eq. (45)–(50) for connectors.
-    pub fn is_square_rib(&self, length: f64) -> bool {
+    pub(crate) fn is_square_rib(&self, length: f64) -> bool {
         self.square_rib.unwrap_or_else(|| {
             self.at.is_end(length) && self.position.is_some() && self.has_orientation()
         })
@@ -741,7 +378,7 @@ impl SupportSpec {
 
 impl Component {
     /// The coordinate held; `None` where it is free. Units: m.
-    pub fn value(&self) -> Option<f64> {
+    pub(crate) fn value(&self) -> Option<f64> {
         match *self {
             Self::Held(value) => Some(value),
             Self::Free => None,

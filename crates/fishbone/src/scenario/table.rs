@@ -1,4 +1,4 @@
-//! How the tables of a scenario are declared.
+//! The declaration of tables of a scenario.
 
 /// Declares a struct that stands as a table in scenario files.
 ///

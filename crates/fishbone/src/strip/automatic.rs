@@ -90,7 +90,7 @@ impl<D: Density<F>, const F: usize> density::Derivatives<D, F> for Derivatives<F
         self.lanes[lane] = Lane::of(density, loaded);
     }
 
-    /// They are found as elements are set.
+    /// Nothing is left to compute: `set` finds the derivatives.
     fn find(&mut self, _: &D) {}
 
     fn gradient(&self, lane: usize) -> [SVector<f64, F>; 2] {
@@ -143,7 +143,7 @@ impl<const F: usize> Lane<F> {
         lane
     }
 
-    /// Second derivative by two fields, those at the first end before those at the second.
+    /// Sets the second derivative by two fields. Fields are numbered through both ends, the first end's before the second's.
     fn set_hessian(&mut self, a: usize, b: usize, value: f64) {
         let (i, j) = (a % F, b % F);
         match (a / F, b / F) {
@@ -246,6 +246,7 @@ where
 
 /// Σ (−θ²)ⁿ/(2n + 1 + order)!: sin θ/θ, (1 − cos θ)/θ² and (θ − sin θ)/θ³, by θ². Exact for elements that turn by up to π.
 fn even_series<T: DualNum<Primitive = f64> + Copy>(square: T, order: u32) -> T {
+    /// Terms of the series, a number.
     const TERMS: u32 = 16;
     let mut factorial: f64 = (1..=order + 1).map(f64::from).product();
     let mut coefficients = [0.0; TERMS as usize];

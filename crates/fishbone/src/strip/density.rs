@@ -1,17 +1,16 @@
-//! What an energy of the bent belt is to the programme: a density per unit length of the spine, with its derivatives.
+//! The energy of the bent belt as the programme takes it: a density per unit length of the spine, with its derivatives.
 //!
 //! A density is a function of fields along the spine and of their rates. The first two fields are the bend ω_ζ and the rib
 //! slope β; a density may have more. Fields are linear within an element. The pose increment and the energy are both taken
 //! at the element's two Gauss points.
 
 use crate::geometry::{Pose, gauss_points};
-use crate::strip::developable::Curl;
-use crate::strip::element::Element;
+use crate::strip::element::{Curl, Element};
 use nalgebra::{SVector, Vector6};
 use num_dual::DualNum;
 use stagewise::{Stage, StageMatrix};
 
-/// Elements whose motions and derivatives are found at a time.
+/// Elements whose motions and derivatives are found at a time, a number.
 pub const LANES: usize = 8;
 
 /// A place of the belt at which a density is asked for.
@@ -19,7 +18,7 @@ pub const LANES: usize = 8;
 pub struct Section<'a, T, const F: usize> {
     /// Fields at the place, of which the first two are bend and rib slope.
     pub fields: [T; F],
-    /// Their derivatives by u.
+    /// Derivatives of the fields by u.
     pub rates: [T; F],
     /// Fields at both ends of the element.
     pub ends: [[T; F]; 2],
@@ -37,8 +36,8 @@ pub trait Density<const F: usize>: Clone {
     /// The density. The numbers may carry derivatives.
     fn value<T: DualNum<Primitive = f64> + Copy>(&self, section: &Section<'_, T, F>) -> T;
 
-    /// Torsion ω_η and bend ω_ζ of the spine: its frame turns by (κ_g, ω_η, ω_ζ) per unit length. Unless a density says
-    /// otherwise the ribs are exact, ω_η = −β ω_ζ.
+    /// Torsion ω_η and bend ω_ζ of the spine: its frame turns by (κ_g, ω_η, ω_ζ) per unit length. Unless a density defines
+    /// them otherwise the ribs are exact, ω_η = −β ω_ζ.
     ///
     /// Source: Eq. (32)
     fn torsion_and_bend<T: DualNum<Primitive = f64> + Copy>(&self, fields: &[T; F]) -> [T; 2] {
@@ -51,7 +50,7 @@ pub trait Density<const F: usize>: Clone {
     }
 }
 
-/// An element in its place: what its derivatives depend on.
+/// An element with the data that its derivatives depend on.
 #[derive(Debug, Clone, Copy)]
 pub struct Loaded<'a, const F: usize> {
     /// The element.
@@ -60,7 +59,8 @@ pub struct Loaded<'a, const F: usize> {
     pub fields: [&'a SVector<f64, F>; 2],
     /// Poses of both nodes.
     pub poses: [&'a Pose; 2],
-    /// Derivative of all work by a twist of the belt from the second node on: force, then moment about the origin, world axes.
+    /// Derivative of all work by a twist of the belt from the second node on: force, then moment about the origin, world
+    /// axes.
     pub wrench: &'a Vector6<f64>,
 }
 
@@ -87,10 +87,11 @@ pub trait Derivatives<D, const F: usize>: Default {
     /// Gradient of energy and work by the fields at both ends of a lane's element.
     fn gradient(&self, lane: usize) -> [SVector<f64, F>; 2];
 
-    /// Their second derivatives.
+    /// Second derivatives of energy and work by the fields at both ends of a lane's element.
     fn hessian(&self, lane: usize) -> StageMatrix<F>;
 
-    /// Writes how the element of a lane carries the twist on, and second derivatives by that twist and the fields.
+    /// Writes the derivatives of a lane's element along the chain: the twist of its second node by its first node's twist
+    /// and the fields, and second derivatives by that twist and the fields.
     fn carry<const N: usize>(&self, lane: usize, stage: &mut Stage<F, N>);
 }
 
@@ -128,7 +129,7 @@ where
 
 impl<T: DualNum<Primitive = f64> + Copy, const F: usize> Section<'_, T, F> {
     /// Natural bend of the element.
-    pub fn curl(&self) -> &Curl {
+    pub(crate) fn curl(&self) -> &Curl {
         &self.element.curl
     }
 }

@@ -1,11 +1,9 @@
 //! Bending energy of the belt per unit length of the spine: the three models, Eq. (34) and its successors.
 
 use crate::names::named;
-use crate::strip::density::{Density, Section};
-use crate::strip::element::Element;
-use crate::strip::kernel;
+use crate::strip::element::Curl;
 use crate::strip::ribs::{Across, Scaled};
-use nalgebra::{Matrix2, Vector2, Vector4};
+use nalgebra::{Matrix2, Vector2};
 use num_dual::DualNum;
 
 named! {
@@ -22,18 +20,9 @@ named! {
     }
 }
 
-/// The bend that a belt has of itself.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Curl<W = f64> {
-    /// Natural bend k, the ω_ζ of the unloaded belt.
-    pub bend: W,
-    /// Poisson's ratio ν, which says what bending along the curl does across it.
-    pub poisson: f64,
-}
-
 /// A term of the density with its first and second derivatives by (bend, slope).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Term {
+pub(crate) struct Term {
     /// Value.
     pub value: f64,
     /// Gradient.
@@ -43,19 +32,19 @@ pub struct Term {
 }
 
 impl EnergyModel {
-    /// Whether the density depends on what the board is like across the spine.
-    pub fn knows_width(self) -> bool {
+    /// Whether the density depends on the width of the board.
+    pub(crate) fn knows_width(self) -> bool {
         self == Self::Wunderlich
     }
 
     /// Energy per unit length at unit rigidity; the numbers may carry derivatives.
     ///
-    /// With the natural bend k it is that of a plate whose unloaded state is a cylinder: the bracket
-    /// κ₁² − 2k ω_ζ (1 + ν β²) + k², each term times what the width makes of it. The source's model has no plate behind
-    /// it and takes the bracket times sqrt(1+β²).
+    /// With the natural bend k the energy is that of a plate whose unloaded state is a cylinder: the bracket
+    /// κ₁² − 2k ω_ζ (1 + ν β²) + k², each term times its factor of the width, [`Across`]. The source's model has no plate
+    /// behind it and takes the bracket times sqrt(1+β²).
     ///
     /// Source: Eq. (29), (34), in β: written in ω_η/ω_ζ it is singular where the belt is not bent.
-    pub fn value<W: DualNum<Primitive = f64> + Copy, D: Scaled<W>>(
+    pub(crate) fn value<W: DualNum<Primitive = f64> + Copy, D: Scaled<W>>(
         self,
         bend: D,
         slope: D,
@@ -80,7 +69,7 @@ impl EnergyModel {
 
     /// The term in κ₁² at unit rigidity, before the width's factor.
     #[inline(always)]
-    pub fn bending(self, bend: f64, slope: f64) -> Term {
+    pub(crate) fn bending(self, bend: f64, slope: f64) -> Term {
         let c = self.slope_factor(slope);
         let half = 0.5 * bend * bend;
         Term {
@@ -91,7 +80,7 @@ impl EnergyModel {
     }
 
     /// The term linear in the bend, −k ω_ζ (1 + ν β²), before the width's factor.
-    pub fn mixed(self, bend: f64, slope: f64, curl: &Curl) -> Term {
+    pub(crate) fn mixed(self, bend: f64, slope: f64, curl: &Curl) -> Term {
         let [f, f1, f2] = self.stretch_factor(slope);
         let (nu, k) = (curl.poisson, -curl.bend);
         let q = 1.0 + nu * slope * slope;
@@ -105,7 +94,7 @@ impl EnergyModel {
     }
 
     /// The term of the natural bend alone, k²/2, before the width's factor.
-    pub fn natural(self, slope: f64, curl: &Curl) -> Term {
+    pub(crate) fn natural(self, slope: f64, curl: &Curl) -> Term {
         let [f, f1, f2] = self.stretch_factor(slope);
         let half = 0.5 * curl.bend * curl.bend;
         Term {
@@ -152,30 +141,12 @@ impl EnergyModel {
     }
 }
 
-impl Density<2> for EnergyModel {
-    type Motions = kernel::Motions;
-    type Derivatives = kernel::Block;
-
-    fn value<T: DualNum<Primitive = f64> + Copy>(&self, section: &Section<'_, T, 2>) -> T {
-        let [bend, slope] = section.fields;
-        let slopes = section.ends.map(|end| end[1]);
-        let across = match self.knows_width() {
-            true => section.element.strips().across(slopes),
-            false => Across::PLAIN.map(T::from),
-        };
-        EnergyModel::value(*self, bend, slope, section.curl(), &across)
-    }
-
-    fn energy(&self, element: &Element, [a, b]: [&Vector2<f64>; 2]) -> f64 {
-        element.energy(*self, &Vector4::new(a[0], a[1], b[0], b[1]))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use num_dual::{Dual2SVec64, hessian};
 
+    /// Energy models, one of each.
     const MODELS: [EnergyModel; 3] = [
         EnergyModel::Fishbone,
         EnergyModel::Sadowsky,

@@ -1,4 +1,4 @@
-//! The strip of the board between two neighbouring ribs: where its ribs end, when they cross, what its width adds.
+//! The strip of the board between two neighbouring ribs: the ends of its ribs, their crossing, the factors of its width.
 //!
 //! A strip is known by the rib slope β and by s = β' + κ_g (1+β²): at v it is `1 − v s` times as wide as on the spine.
 
@@ -6,24 +6,25 @@ use nalgebra::{Matrix2, Vector2};
 use num_dual::{Derivative, Dual2SVec64, DualNum};
 use std::ops::{Div, Mul};
 
-/// How fast neighbouring ribs converge towards +v: s = β' + κ_g (1 + β²).
+/// Rib convergence, the rate at which neighbouring ribs close in towards +v: s = β' + κ_g (1 + β²).
 ///
 /// The strip between two ribs is (1 − v s) du wide at v, so ribs meet at v = 1/s. For κ_g = 0 it is the β' of the source.
 ///
 /// Source: Eq. (33), extended to curved belts
-pub fn rib_convergence(slope_rate: f64, geodesic: f64, rib_slope: f64) -> f64 {
+pub(crate) fn rib_convergence(slope_rate: f64, geodesic: f64, rib_slope: f64) -> f64 {
     slope_rate + geodesic * (1.0 + rib_slope * rib_slope)
 }
 
 /// The greatest |s| for which ribs do not cross inside the width, 2/V.
 ///
 /// Source: Eq. (33)
-pub fn rib_convergence_bound(width: f64) -> f64 {
+pub(crate) fn rib_convergence_bound(width: f64) -> f64 {
     2.0 / width
 }
 
-/// A number, it may be with derivatives, that numbers of another kind may multiply: the width is mostly a plain one.
-pub trait Scaled<W>:
+/// A number, with or without derivatives, that a number `W` of another type multiplies: the width is a plain number unless
+/// it is differentiated by.
+pub(crate) trait Scaled<W>:
     DualNum<Primitive = f64> + Copy + Mul<W, Output = Self> + Div<W, Output = Self>
 {
 }
@@ -33,21 +34,20 @@ impl<W, D> Scaled<W> for D where
 {
 }
 
-/// What the density's terms are multiplied by to hold for the whole width: integrals over v from the rib's one end v₋ to
-/// the other v₊, divided by V.
+/// Factors of the width in the density's terms: integrals over v from the rib's one end v₋ to the other v₊, divided by V.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Across<T> {
-    /// ∫ dv / (1 − v s), of the squared curvature.
+pub(crate) struct Across<T> {
+    /// ∫ dv / (1 − v s), the factor of the squared curvature.
     pub bending: T,
-    /// ∫ dv, of the curvature.
+    /// ∫ dv, the factor of the curvature.
     pub length: T,
-    /// ∫ (1 − v s) dv, of what does not depend on the curvature.
+    /// ∫ (1 − v s) dv, the factor of the terms without curvature.
     pub area: T,
 }
 
 impl Across<f64> {
-    /// The narrow limit, and every straight belt whose ribs are parallel.
-    pub const PLAIN: Self = Self {
+    /// Factors of the width in the narrow limit, and in every straight belt whose ribs are parallel, dimensionless.
+    pub(crate) const PLAIN: Self = Self {
         bending: 1.0,
         length: 1.0,
         area: 1.0,
@@ -55,8 +55,8 @@ impl Across<f64> {
 }
 
 impl<D: DualNum<Primitive = f64> + Copy> Across<D> {
-    /// Of a straight belt, by y = sV/2.
-    pub fn straight(y: D) -> Self {
+    /// Factors of the width of a straight belt, by y = sV/2.
+    pub(crate) fn straight(y: D) -> Self {
         Self {
             bending: artanh_ratio(y),
             ..Across::PLAIN.map(D::from)
@@ -65,8 +65,8 @@ impl<D: DualNum<Primitive = f64> + Copy> Across<D> {
 }
 
 impl<T: Copy> Across<T> {
-    /// The same in another kind of number.
-    pub fn map<U>(&self, f: impl Fn(T) -> U) -> Across<U> {
+    /// The factors in another type of number.
+    pub(crate) fn map<U>(&self, f: impl Fn(T) -> U) -> Across<U> {
         Across {
             bending: f(self.bending),
             length: f(self.length),
@@ -75,9 +75,9 @@ impl<T: Copy> Across<T> {
     }
 }
 
-/// A function of the rib slopes at both ends of an element, with its derivatives by them.
+/// A function of the rib slopes at both ends of an element, with its derivatives by these slopes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SlopeJet {
+pub(crate) struct SlopeJet {
     /// Value.
     pub value: f64,
     /// Gradient.
@@ -88,7 +88,7 @@ pub struct SlopeJet {
 
 impl SlopeJet {
     /// A constant.
-    pub fn constant(value: f64) -> Self {
+    pub(crate) fn constant(value: f64) -> Self {
         Self {
             value,
             gradient: Vector2::zeros(),
@@ -96,8 +96,8 @@ impl SlopeJet {
         }
     }
 
-    /// A function of s·V/2 = `rate` (β₁ − β₀), from its derivatives by that.
-    fn of_share(rate: f64, [value, first, second]: [f64; 3]) -> Self {
+    /// A function of s·V/2 = `rate` (β₁ − β₀), from its value and derivatives by s·V/2.
+    pub(super) fn of_share(rate: f64, [value, first, second]: [f64; 3]) -> Self {
         let by = Vector2::new(-rate, rate);
         Self {
             value,
@@ -122,142 +122,36 @@ impl From<Dual2SVec64<2>> for SlopeJet {
     }
 }
 
-/// A line or an arc of the board's outline as seen from the foot of a rib, by the tangent nearest to the foot.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Edge<W = f64> {
-    /// Direction of that tangent along and across the spine at the foot, (cos δ, sin δ).
-    pub direction: Vector2<f64>,
-    /// Its distance c from the foot, negative on the −ζ side.
-    pub distance: W,
-    /// Curvature, 0 of a line; towards the side on which the edge lies.
-    pub curvature: W,
-    /// Turns of its first and last tangent from the nearest one, rising.
-    pub turn: [f64; 2],
-}
-
-impl Edge {
-    /// A straight line.
-    pub fn line(direction: Vector2<f64>, distance: f64) -> Self {
-        Self {
-            direction,
-            distance,
-            curvature: 0.0,
-            turn: [0.0; 2],
-        }
-    }
-
-    /// The same edge in other units: lengths times a factor.
-    pub fn scaled(&self, factor: f64) -> Self {
-        Self {
-            distance: self.distance * factor,
-            curvature: self.curvature / factor,
-            ..*self
-        }
-    }
-}
-
-impl<W: DualNum<Primitive = f64> + Copy> Edge<W> {
-    /// How far ribs are from crossing before they reach the edge: the least of `cos δ + β sin δ − s c` over its tangents.
-    ///
-    /// A rib meets a tangent at v = c/(cos δ + β sin δ), so this is 1 − s v in other words; but it counts a rib so
-    /// steep that it passes the edge by as crossing others.
-    pub fn slack<D: Scaled<W>>(&self, slope: D, s: D) -> D {
-        let (along, across) = (self.direction.x, self.direction.y);
-        let nearest = slope * across - s * self.distance + along;
-        if self.curvature.re() == 0.0 {
-            return nearest;
-        }
-        // Over the tangents it is a sine of their turn.
-        let quarter = slope * along - across;
-        let (k, side) = (self.curvature, self.curvature.re().signum());
-        let beyond = s - nearest * k;
-        let lowest = (-quarter.re() * k.re().abs()).atan2(side * beyond.re());
-        if (self.turn[0]..=self.turn[1]).contains(&lowest) {
-            let square = beyond * beyond + quarter * quarter * (k * k);
-            if square.re() == 0.0 {
-                // Ribs that meet in the centre of the arc are as far from all of its tangents.
-                return nearest;
-            }
-            let amplitude = square.sqrt();
-            let squares = nearest * nearest + quarter * quarter;
-            return (nearest * s * 2.0 - squares * k) * side / (s * side + amplitude);
-        }
-        let at = |turn: f64| {
-            nearest * turn.cos() + quarter * turn.sin() + s * (2.0 * (0.5 * turn).sin().powi(2)) / k
-        };
-        let [first, last] = self.turn.map(at);
-        if first < last { first } else { last }
-    }
-}
-
-/// Most edges that bound ribs besides those of their own stretch.
-pub const FURTHER: usize = 3;
-/// Most inequalities of an element: its own edges, then further ones.
-pub const BOUNDS: usize = 2 + FURTHER;
-
 /// The strips of one element: of half the width, in-plane curvature κ_g, and length.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Strips<W = f64> {
+pub(crate) struct Strips<W = f64> {
     /// Half the width, V/2.
     pub half_width: W,
     /// In-plane curvature κ_g of the flat board.
     pub geodesic: f64,
     /// Length along the spine.
     pub length: f64,
-    /// Edges of the board, besides those of the stretch, before which ribs must not cross either.
-    pub further: [Option<Edge<W>>; FURTHER],
 }
 
-/// An inner edge tighter than this, in V/2, counts as this tight: the true one is trimmed.
+/// Greatest curvature of an arc with which its inner edge is computed, in 2/V: the true inner edge of a tighter arc is
+/// trimmed.
 const TIGHTEST: f64 = 0.9;
 
 impl<W: DualNum<Primitive = f64> + Copy> Strips<W> {
-    /// The mean rib slope and the rib measure s = β' + κ_g (1+β²) there, which stands for the whole element.
+    /// The mean rib slope and the rib convergence s = β' + κ_g (1+β²) there, which stand for the whole element.
     ///
     /// Source: Eq. (33), extended to curved belts
-    pub fn measure<D: DualNum<Primitive = f64> + Copy>(&self, slopes: [D; 2]) -> (D, D) {
+    pub(crate) fn middle<D: DualNum<Primitive = f64> + Copy>(&self, slopes: [D; 2]) -> (D, D) {
         let mean = (slopes[0] + slopes[1]) * 0.5;
         let rise = (slopes[1] - slopes[0]) / self.length;
         (mean, rise + (mean * mean + 1.0) * self.geodesic)
     }
 
-    /// How far the ribs are from crossing on the board, by slopes at both ends of the element: `1 − s v` at the +ζ and
-    /// at the −ζ edge of the stretch, then [`Edge::slack`] at the further edges, 1 where there are none.
-    ///
-    /// On an arc v is where the rib meets the inner edge; towards the outer one, which a rib meets before V/2, it is V/2
-    /// all the same, so that |s| ≤ 2/V holds everywhere.
-    ///
-    /// Source: Eq. (33)
-    pub fn slacks<D: Scaled<W> + From<W>>(&self, slopes: [D; 2]) -> [D; BOUNDS] {
-        let (mean, s) = self.measure(slopes);
-        let w = self.half_width;
-        let [minus, plus] = if self.geodesic == 0.0 {
-            [D::from(-w), D::from(w)]
-        } else if self.geodesic > 0.0 {
-            [D::from(-w), self.ends(mean)[1]]
-        } else {
-            [self.ends(mean)[0], D::from(w)]
-        };
-        let further = |edge: &Option<Edge<W>>| match edge {
-            None => D::one(),
-            Some(edge) => edge.slack(mean, s),
-        };
-        let [a, b, c] = self.further.each_ref().map(further);
-        [-s * plus + 1.0, -s * minus + 1.0, a, b, c]
-    }
-
-    /// The places among [`Self::slacks`] of those that bound something: the stretch's own edges, and further ones that there
-    /// are.
-    pub fn bounds(&self) -> impl Iterator<Item = usize> + use<W> {
-        let further = self.further.each_ref().map(Option::is_some);
-        (0..BOUNDS).filter(move |bound| *bound < 2 || further[bound - 2])
-    }
-
-    /// Where the rib of this slope meets the edges, v₋ and v₊: `v − κ_g v² (1+β²)/2 = ±V/2 − κ_g V²/8`.
+    /// Ends v₋ and v₊ of the rib of a slope, on the edges: `v − κ_g v² (1+β²)/2 = ±V/2 − κ_g V²/8`.
     ///
     /// A rib so steep that it misses the inner edge of its own arc leaves the board farther along; there the root is
     /// continued smoothly.
-    pub fn ends<D: Scaled<W>>(&self, slope: D) -> [D; 2] {
+    pub(crate) fn ends<D: Scaled<W>>(&self, slope: D) -> [D; 2] {
         let w = self.half_width;
         let tightest = W::from(TIGHTEST) / w;
         let geodesic = match self.geodesic.abs() < tightest.re() {
@@ -272,9 +166,9 @@ impl<W: DualNum<Primitive = f64> + Copy> Strips<W> {
         })
     }
 
-    /// What the width makes of the density's terms, by slopes at both ends of the element.
-    pub fn across<D: Scaled<W>>(&self, slopes: [D; 2]) -> Across<D> {
-        let (mean, s) = self.measure(slopes);
+    /// Factors of the width in the density's terms, by slopes at both ends of the element.
+    pub(crate) fn across<D: Scaled<W>>(&self, slopes: [D; 2]) -> Across<D> {
+        let (mean, s) = self.middle(slopes);
         let [minus, plus] = self.ends(mean);
         let length = (plus - minus) / (self.half_width * 2.0);
         let middle = -s * (plus + minus) * 0.5 + 1.0;
@@ -288,26 +182,8 @@ impl<W: DualNum<Primitive = f64> + Copy> Strips<W> {
 }
 
 impl Strips {
-    /// Whether the slacks are linear in the slopes.
-    pub fn has_linear_bounds(&self) -> bool {
-        self.geodesic == 0.0 && self.further == [None; FURTHER]
-    }
-
-    /// The slacks with derivatives.
-    pub fn slack_jets(&self, slopes: [f64; 2]) -> [SlopeJet; BOUNDS] {
-        if self.has_linear_bounds() {
-            let rate = self.half_width / self.length;
-            let y = rate * (slopes[1] - slopes[0]);
-            let [plus, minus] =
-                [-1.0, 1.0].map(|sign| SlopeJet::of_share(rate, [1.0 + sign * y, sign, 0.0]));
-            let none = SlopeJet::constant(1.0);
-            return [plus, minus, none, none, none];
-        }
-        self.slacks(variables(slopes)).map(SlopeJet::from)
-    }
-
-    /// What the width makes of the density's terms, with derivatives.
-    pub fn across_jets(&self, slopes: [f64; 2]) -> Across<SlopeJet> {
+    /// Factors of the width in the density's terms, with derivatives.
+    pub(crate) fn across_jets(&self, slopes: [f64; 2]) -> Across<SlopeJet> {
         if self.geodesic == 0.0 {
             let rate = self.half_width / self.length;
             let y = rate * (slopes[1] - slopes[0]);
@@ -320,16 +196,18 @@ impl Strips {
     }
 }
 
-/// Two numbers that carry their first and second derivatives along.
-fn variables(at: [f64; 2]) -> [Dual2SVec64<2>; 2] {
+/// Two variables as numbers that carry first and second derivatives.
+pub(super) fn variables(at: [f64; 2]) -> [Dual2SVec64<2>; 2] {
     let [mut first, mut second] = at.map(Dual2SVec64::from);
     first.v1 = Derivative::derivative_generic(nalgebra::Const::<1>, nalgebra::Const::<2>, 0);
     second.v1 = Derivative::derivative_generic(nalgebra::Const::<1>, nalgebra::Const::<2>, 1);
     [first, second]
 }
 
-/// √t, continued below a small t, two derivatives and all, by what stays positive: a square root would end at 0.
+/// √t, continued below a small t by a positive function with the same value and first two derivatives: a square root would
+/// end at 0.
 fn continued_root<D: DualNum<Primitive = f64> + Copy>(t: D) -> D {
+    /// Argument t below which the square root is continued, dimensionless.
     const SMALL: f64 = 0.01;
     if t >= SMALL {
         return t.sqrt();
@@ -338,8 +216,9 @@ fn continued_root<D: DualNum<Primitive = f64> + Copy>(t: D) -> D {
     (below * 0.5 - below * below * 0.25).exp() * SMALL.sqrt()
 }
 
-/// Below this y² the closed form of artanh(y)/y cancels, and the series Σ y²ⁿ/(2n+1) is exact in [`TERMS`] terms.
+/// Square y² below which artanh(y)/y comes from the series Σ y²ⁿ/(2n+1), dimensionless: its closed form cancels there.
 const SERIES_BELOW: f64 = 0.04;
+/// Terms of the series of artanh(y)/y, a number: exact in double precision below [`SERIES_BELOW`].
 const TERMS: i32 = 14;
 
 /// artanh(y)/y.
@@ -365,7 +244,7 @@ fn artanh_ratio_with_derivatives(y: f64) -> [f64; 3] {
     [g, g1, g2]
 }
 
-/// The same from the series.
+/// artanh(y)/y and its first two derivatives, from the series.
 fn artanh_ratio_series(y: f64) -> [f64; 3] {
     let square = y * y;
     let (mut g1, mut g2) = (0.0, 0.0);
@@ -387,11 +266,10 @@ mod tests {
             half_width: 0.05,
             geodesic,
             length: 0.0125,
-            further: [None; FURTHER],
         }
     }
 
-    /// Pairs of slopes from which the ribs do not cross.
+    /// Slopes at both ends of elements whose ribs do not cross, dimensionless.
     const SLOPES: [[f64; 2]; 5] = [
         [0.0, 0.0],
         [0.3, 0.3 + 1e-9],
@@ -406,7 +284,7 @@ mod tests {
         for geodesic in [0.0, 1.4, -6.0] {
             let strips = strips(geodesic);
             for slopes in SLOPES {
-                let (mean, s) = strips.measure(slopes);
+                let (mean, s) = strips.middle(slopes);
                 let [minus, plus] = strips.ends(mean);
                 let n = 100_000;
                 let step = (plus - minus) / f64::from(n);
@@ -450,47 +328,6 @@ mod tests {
     }
 
     #[test]
-    fn test_slack_at_an_edge_is_the_least_over_its_tangents() {
-        // By the points of the arc and their tangents, from a centre and a radius.
-        for (curvature, nearest, distance) in [(4.0f64, 0.3f64, 0.05f64), (-9.0, -0.8, -0.03)] {
-            let edge = Edge {
-                direction: Vector2::new(nearest.cos(), nearest.sin()),
-                distance,
-                curvature,
-                turn: [-0.6, 0.5],
-            };
-            let radius = 1.0 / curvature;
-            let left = |angle: f64| Vector2::new(-angle.sin(), angle.cos());
-            let centre = (distance + radius) * left(nearest);
-            for slope in [-1.5, -0.2, 0.0, 0.7, 2.0] {
-                for s in [-30.0, -12.0, -1.0, 0.0, 3.0, 15.0, 25.0] {
-                    let at = |i: i32| {
-                        let angle = nearest - 0.6 + 1.1 * f64::from(i) / 4000.0;
-                        let point = centre - radius * left(angle);
-                        let c = left(angle).dot(&point);
-                        angle.cos() + slope * angle.sin() - s * c
-                    };
-                    let least = (0..=4000).map(at).fold(f64::INFINITY, f64::min);
-                    assert!((edge.slack(slope, s) - least).abs() < 1e-5, "{slope} {s}");
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn test_ribs_that_meet_in_the_centre_of_an_arc_are_as_far_from_all_of_it() {
-        let edge = Edge {
-            direction: Vector2::x(),
-            distance: 0.05,
-            curvature: 1.0 / 0.2,
-            turn: [-0.3, 0.3],
-        };
-        let [slope, s] = variables([0.0, 4.0]);
-        let jet = SlopeJet::from(edge.slack(slope, s));
-        assert!((jet.value - 0.8).abs() < 1e-15 && jet.gradient.amax().is_finite());
-    }
-
-    #[test]
     fn test_arc_of_no_curvature_is_straight() {
         for slopes in SLOPES {
             let (flat, bent) = (strips(0.0), strips(1e-9));
@@ -500,8 +337,6 @@ mod tests {
                     bent.across_jets(slopes).bending,
                 ),
                 (flat.across_jets(slopes).area, bent.across_jets(slopes).area),
-                (flat.slack_jets(slopes)[0], bent.slack_jets(slopes)[0]),
-                (flat.slack_jets(slopes)[1], bent.slack_jets(slopes)[1]),
             ] {
                 assert!((a.value - b.value).abs() < 1e-9);
                 assert!((a.gradient - b.gradient).amax() < 1e-7 * a.gradient.amax().max(1.0));
@@ -532,8 +367,6 @@ mod tests {
                     true => Dual2SVec64::from(1.0),
                     false => strips.across(x).area,
                 });
-                check(strips.slack_jets(slopes)[0], &|x| strips.slacks(x)[0]);
-                check(strips.slack_jets(slopes)[1], &|x| strips.slacks(x)[1]);
             }
         }
     }
@@ -545,7 +378,7 @@ mod tests {
     }
 
     #[test]
-    fn test_continued_root_has_no_kink() {
+    fn test_continued_root_has_no_corner() {
         let h = 1e-4;
         let root = |t: f64| continued_root(t);
         let second = |t: f64| (root(t + h) - 2.0 * root(t) + root(t - h)) / (h * h);

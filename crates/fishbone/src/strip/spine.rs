@@ -1,11 +1,11 @@
-//! The solved centre line with its ribs: what the surface and every report are drawn from.
+//! The solved centre line with its ribs, from which the surface and every report are drawn.
 
 use crate::geometry::{Pose, exp};
 use crate::strip::element::{increment, torsion};
 use crate::strip::ribs::rib_convergence;
 use nalgebra::{Vector3, Vector4};
 
-/// What joins a node of the spine to the next one.
+/// The piece of the belt between a node of the spine and the next.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Piece {
     /// A flexible stretch.
@@ -24,7 +24,7 @@ pub enum Piece {
 
 impl Piece {
     /// In-plane curvature κ_g of the flat board along it.
-    pub fn geodesic(self) -> f64 {
+    pub(crate) fn geodesic(self) -> f64 {
         match self {
             Self::Strip { geodesic } => geodesic,
             Self::Rigid | Self::Joint { .. } => 0.0,
@@ -32,7 +32,7 @@ impl Piece {
     }
 
     /// Angle by which the board turns at a point, from η towards ζ.
-    pub fn corner(self) -> f64 {
+    pub(crate) fn corner(self) -> f64 {
         match self {
             Self::Joint { angle } => angle,
             Self::Rigid | Self::Strip { .. } => 0.0,
@@ -45,7 +45,7 @@ impl Piece {
 pub struct Spine {
     /// Width V of the belt.
     pub width: f64,
-    /// What joins each node to the next. Shapes: one fewer than there are nodes.
+    /// The piece from each node to the next. Shapes: one fewer than there are nodes.
     pub pieces: Vec<Piece>,
     /// Signed half turns after which the end of a closed belt joins its start; `None` of an open belt.
     pub half_turns: Option<i32>,
@@ -61,7 +61,7 @@ pub struct Spine {
 
 /// The spine at one arc length.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SpinePoint {
+pub(crate) struct SpinePoint {
     /// Arc length.
     pub u: f64,
     /// Pose: frame and position.
@@ -105,7 +105,7 @@ impl Spine {
         spine
     }
 
-    /// The same of a straight belt, whose fields may jump where a node is repeated.
+    /// The open straight spine of given fields at the nodes; the fields may jump where a node is repeated.
     ///
     /// # Panics
     ///
@@ -133,7 +133,7 @@ impl Spine {
     /// Torsion ω_η = −β ω_ζ at every node.
     ///
     /// Source: Eq. (32)
-    pub fn torsion(&self) -> Vec<f64> {
+    pub(crate) fn torsion(&self) -> Vec<f64> {
         let fields = self.bend.iter().zip(&self.rib_slope);
         fields.map(|(&bend, &slope)| torsion(bend, slope)).collect()
     }
@@ -154,7 +154,7 @@ impl Spine {
     /// # Panics
     ///
     /// If the spine has no nodes.
-    pub fn at(&self, u: f64) -> SpinePoint {
+    pub(crate) fn at(&self, u: f64) -> SpinePoint {
         let next = self.u.partition_point(|&node| node < u);
         if next == self.u.len() {
             return self.node(next - 1);
@@ -170,7 +170,7 @@ impl Spine {
     /// # Panics
     ///
     /// If there is no such node.
-    pub fn node(&self, index: usize) -> SpinePoint {
+    pub(crate) fn node(&self, index: usize) -> SpinePoint {
         SpinePoint {
             u: self.u[index],
             pose: self.pose[index],

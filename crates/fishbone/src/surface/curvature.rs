@@ -17,7 +17,7 @@ pub struct FirstForm {
 }
 
 impl FirstForm {
-    /// On the spine, where x_u = η and x_v = ζ: E = 1, F = 0, G = 1.
+    /// First form on the spine, where x_u = η and x_v = ζ: E = 1, F = 0, G = 1, dimensionless.
     ///
     /// Sec. V of the source prints "E=1, G=0, F=1", a slip against its Sec. II-B.
     pub const ON_SPINE: Self = Self {
@@ -26,7 +26,7 @@ impl FirstForm {
         g: 1.0,
     };
 
-    /// From the tangent vectors.
+    /// The form of the tangent vectors.
     ///
     /// Source: Eq. (6)–(8)
     pub fn new(x_u: &Vector3<f64>, x_v: &Vector3<f64>) -> Self {
@@ -37,7 +37,7 @@ impl FirstForm {
         }
     }
 
-    /// E G − F².
+    /// Determinant E G − F².
     pub fn determinant(&self) -> f64 {
         self.e * self.g - self.f * self.f
     }
@@ -55,7 +55,7 @@ pub struct SecondForm {
 }
 
 impl SecondForm {
-    /// From the second derivatives of the surface and its unit normal e.
+    /// The form of the second derivatives of the surface and its unit normal e.
     ///
     /// Source: Eq. (9)–(11)
     pub fn new(
@@ -71,7 +71,7 @@ impl SecondForm {
         }
     }
 
-    /// On the spine of a developable belt: L = −ω_ζ, M = ω_η, N = δ.
+    /// The form on the spine of a developable belt: L = −ω_ζ, M = ω_η, N = δ.
     ///
     /// Source: Eq. (16), (17), (24)
     pub fn on_spine(bend: f64, rib_slope: f64) -> Self {
@@ -82,7 +82,7 @@ impl SecondForm {
         }
     }
 
-    /// L N − M².
+    /// Determinant L N − M².
     pub fn determinant(&self) -> f64 {
         self.l * self.n - self.m * self.m
     }
@@ -113,8 +113,8 @@ pub fn mean_curvature(first: &FirstForm, second: &SecondForm) -> f64 {
 
 /// The principal curvatures (κ₁, κ₂), the one of larger magnitude first.
 ///
-/// The source calls them the maximum and the minimum, but then takes κ₂ = 0 on every developable surface: what it
-/// uses are the non-zero and the zero one, whatever their signs.
+/// The source calls κ₁ the maximum and κ₂ the minimum, but then takes κ₂ = 0 on every developable surface: it uses κ₁ as the
+/// non-zero and κ₂ as the zero curvature, whatever their signs.
 ///
 /// Source: Eq. (12), (13), solved
 pub fn principal_curvatures(first: &FirstForm, second: &SecondForm) -> (f64, f64) {

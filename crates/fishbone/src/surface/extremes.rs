@@ -9,9 +9,9 @@ use nalgebra::Vector3;
 /// The farthest point of the spine along a direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HighestPoint {
-    /// Its arc length.
+    /// Arc length of the point.
     pub u: f64,
-    /// Its position.
+    /// Position of the point.
     pub position: Vector3<f64>,
 }
 
@@ -20,7 +20,7 @@ pub struct HighestPoint {
 /// # Panics
 ///
 /// If the spine has no nodes.
-pub fn highest_point(spine: &Spine, direction: &Vector3<f64>) -> HighestPoint {
+pub(crate) fn highest_point(spine: &Spine, direction: &Vector3<f64>) -> HighestPoint {
     let nodes = (0..spine.u.len()).map(|node| spine.node(node));
     let peaks = (0..spine.elements()).flat_map(|element| peaks(spine, element, direction));
     let height = |point: &SpinePoint| point.pose.position.dot(direction);
@@ -38,7 +38,7 @@ pub fn highest_point(spine: &Spine, direction: &Vector3<f64>) -> HighestPoint {
     }
 }
 
-/// Pieces of an element that turn by half a radian at most, so that none hides a peak and a valley.
+/// Number of equal pieces of an element that turn by half a radian at most, so that none hides a peak and a valley.
 fn pieces(spine: &Spine, element: usize) -> usize {
     let geodesic = spine.pieces[element].geodesic();
     let bend = |node: usize| spine.bend[node] * 1f64.hypot(spine.rib_slope[node]);
@@ -82,20 +82,20 @@ fn bisect(f: impl Fn(f64) -> f64, mut a: f64, mut b: f64) -> f64 {
 /// The tightest bend of the surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BendRadius {
-    /// Its radius; 0 where ribs meet on an edge.
+    /// Radius; 0 where ribs meet on an edge.
     pub value: f64,
     /// Arc length of the foot of its rib.
     pub u: f64,
-    /// Where on the rib, v.
+    /// Coordinate v on the rib.
     pub v: f64,
 }
 
 /// The tightest bend of the spine.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpineRadius {
-    /// Its radius.
+    /// Radius.
     pub value: f64,
-    /// Where it is.
+    /// Arc length of the node.
     pub u: f64,
 }
 
@@ -113,7 +113,7 @@ pub fn least_spine_radius(spine: &Spine) -> Option<SpineRadius> {
     least.filter(|radius| radius.value.is_finite())
 }
 
-/// Samples in each smooth piece from which the tightest bend is refined.
+/// Samples in each smooth piece from which the tightest bend is refined, a number.
 const SAMPLES: usize = 8;
 
 /// The least radius of bend over the whole width, (1 − v s)/|κ₁|; `None` where the belt is flat all over.
@@ -180,7 +180,7 @@ fn tightest_on_rib(spine: &Spine, board: &Board, element: usize, distance: f64) 
     }
 }
 
-/// The least value's place of a function with one valley between a and b.
+/// The minimiser of a function with one valley between a and b.
 fn golden_section(f: impl Fn(f64) -> f64, mut a: f64, mut b: f64) -> f64 {
     let ratio = 0.5 * (5f64.sqrt() - 1.0);
     for _ in 0..50 {
@@ -194,16 +194,16 @@ fn golden_section(f: impl Fn(f64) -> f64, mut a: f64, mut b: f64) -> f64 {
     0.5 * (a + b)
 }
 
-/// How far the ribs are from crossing on an edge.
+/// Margin of the ribs against crossing on an edge.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RibMargin {
     /// Least of 2/V − |s|; negative where ribs cross inside the width.
     pub value: f64,
-    /// Middle of the element where it is least.
+    /// Arc length of the middle of the element where the margin is least.
     pub u: f64,
 }
 
-/// The least of 2/V − |s| over the flexible elements, s being that in the middle of each, as it is bounded in solving.
+/// The least of 2/V − |s| over the flexible elements, with s in the middle of each element, where the solver bounds it.
 ///
 /// Source: Eq. (33)
 pub fn rib_margin(spine: &Spine) -> RibMargin {
@@ -243,7 +243,7 @@ mod tests {
 
     #[test]
     fn test_highest_point_of_a_circle_is_found_between_nodes() {
-        // Half a turn of a circle of radius 1/3 in three elements.
+        // The spine is half a turn of a circle of radius 1/3 in three elements.
         let length = 3.0 * std::f64::consts::PI / 3.0;
         let u = (0..4).map(|i| length * f64::from(i) / 3.0).collect();
         let spine = Spine::straight(0.1, Pose::identity(), u, vec![3.0; 4], vec![0.0; 4]);

@@ -7,9 +7,11 @@ use std::f64::consts::{PI, TAU};
 /// The signed half turns that a closed belt has made; `None` of an open one.
 ///
 /// Twist plus writhe is the linking number of the two edges, half the number of half turns (Călugăreanu, White, Fuller).
-/// Where a belt passes through itself the number changes by four, and the frames alone tell it but for a multiple of
-/// four. Of several that the shape cannot tell apart, because it touches itself, it is the one the belt began with.
-pub fn half_turns(spine: &Spine) -> Option<i32> {
+/// Where a belt passes through itself the number changes by four; the frames alone determine it up to a multiple of four. Of
+/// a shape that touches itself the writhe is in doubt, and the number closest to the initial one that agrees with the frames
+/// is reported.
+pub(crate) fn half_turns(spine: &Spine) -> Option<i32> {
+    /// Change of the linking number from which a self-passage is certain, in passages of four half turns each.
     const DOUBT: f64 = 0.6;
     let begun = spine.half_turns?;
     let by_frames = begun
@@ -22,16 +24,16 @@ pub fn half_turns(spine: &Spine) -> Option<i32> {
     if touches_itself(&points) {
         return Some(by_frames);
     }
-    let measured = 2.0 * (spine.twist() / TAU + writhe(&points));
-    let passes = (measured - f64::from(by_frames)) / 4.0;
+    let counted = 2.0 * (spine.twist() / TAU + writhe(&points));
+    let passes = (counted - f64::from(by_frames)) / 4.0;
     match passes.is_finite() && passes.abs() > DOUBT {
         true => Some(by_frames + 4 * passes.round() as i32),
         false => Some(by_frames),
     }
 }
 
-/// Whether the frames, followed along the belt as quaternions, come back as those of a ring with these half turns do:
-/// a ring itself comes back with the other sign.
+/// Whether the frames, followed along the belt as quaternions, return with the sign that frames of a ring with these half
+/// turns return with; a ring without half turns returns with the opposite sign.
 fn is_lifted_as_begun(spine: &Spine, begun: i32) -> bool {
     let quaternion = |k: usize| {
         let frame = Rotation3::from_matrix_unchecked(spine.pose[k].frame);
@@ -51,8 +53,9 @@ fn is_lifted_as_begun(spine: &Spine, begun: i32) -> bool {
     expected.coords.dot(&lifted.coords) < 0.0
 }
 
-/// The closed polygon through nodes of the spine, of no more points than it takes to count half turns.
+/// The closed polygon through nodes of the spine, of no more points than a count of half turns takes.
 fn polygon(spine: &Spine) -> Vec<Vector3<f64>> {
+    /// Greatest count of points of the polygon, a number.
     const POINTS: usize = 240;
     let last = spine.pose.len() - 1;
     let count = last.min(POINTS);
@@ -63,8 +66,9 @@ fn polygon(spine: &Spine) -> Vec<Vector3<f64>> {
     points
 }
 
-/// Whether points far from each other along a closed polygon lie as close as it is smooth.
+/// Whether points far from each other along a closed polygon lie too close for its writhe to be certain.
 fn touches_itself(points: &[Vector3<f64>]) -> bool {
+    /// Distance below which two parts of the polygon touch, as a share of its length.
     const CLOSE: f64 = 1e-4;
     let count = points.len();
     let length: f64 = (0..count)
@@ -118,7 +122,7 @@ mod tests {
                 position: Vector3::new((TAU * t).cos() - 1.0, (TAU * t).sin(), 0.0) / TAU,
             }
         };
-        // A constant bend and slope with the torsion wanted, whatever the frames' other rates.
+        // Constant bend and slope give the torsion of the frames; their other rates do not matter.
         let torsion = PI * f64::from(half_turns);
         Spine {
             width: 0.01,
@@ -163,7 +167,7 @@ mod tests {
                 })
                 .collect()
         };
-        // Gauss's double integral by the midpoint rule.
+        // The expected writhe is Gauss's double integral by the midpoint rule.
         let points = trefoil(1.0);
         let n = points.len();
         let mut gauss = 0.0;

@@ -1,4 +1,4 @@
-//! Which part of the surface a flat point belongs to.
+//! The rib or the plane of the surface to which a flat point belongs.
 
 use super::patch::Polygon;
 use crate::board::feet::{Board, Foot};
@@ -48,7 +48,7 @@ fn on_plate(spine: &Spine, board: &Board, point: &Vector2<f64>) -> Option<Foot> 
     Some(board.foot_at_node(spine, from))
 }
 
-/// The first or the last rib, where the point is in the corner that it leaves out.
+/// The first or the last rib, if the point is in the corner that this rib leaves out.
 fn beyond_end(spine: &Spine, board: &Board, point: &Vector2<f64>) -> Option<Foot> {
     [0, spine.u.len() - 1].into_iter().find_map(|node| {
         let foot = board.foot_at_node(spine, node);

@@ -6,7 +6,7 @@ use crate::board::feet::{Board, End, Foot};
 use crate::strip::spine::Spine;
 use nalgebra::{Vector2, Vector3};
 
-/// A triangle mesh of the deformed belt that knows the flat board it came from.
+/// A triangle mesh of the deformed belt, with the same mesh on the flat board.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Mesh {
     /// Deformed points.
@@ -18,19 +18,19 @@ pub struct Mesh {
     pub triangles: Vec<[u32; 3]>,
     /// The same triangles in the flat board, as indices of `flat`; they differ along the seam of a closed belt alone.
     pub flat_triangles: Vec<[u32; 3]>,
-    /// Arc lengths of the feet of the two ribs between which each triangle lies; those of one rib in the flat corner
-    /// beyond it.
+    /// Arc lengths of the feet of the two ribs between which each triangle lies; twice the same foot in the flat corner
+    /// beyond a rib.
     pub spans: Vec<[f64; 2]>,
 }
 
 /// The mesh of the whole belt: strips between ribs of `n_across` points (at least 2), flat patches in the corners
 /// that no rib reaches and where stiffeners are joined at corners.
 ///
-/// It covers the flat board without gaps, overlaps or T-junctions, exactly but for the arcs of its outline, which
-/// become chords between neighbouring ribs: ribs are added through those vertices of the outline that lie between two
-/// nodes' ribs, and ribs that meet on an edge share their vertex. A closed belt has no ends, and its last rib is its
-/// first, reversed after an odd number of half turns. Where ribs cross inside the board, against Eq. (33), there is no
-/// surface, and the triangles overlap.
+/// The mesh covers the flat board without gaps, overlaps or T-junctions, exactly but for the arcs of its outline, which
+/// become chords between neighbouring ribs: ribs are added through those vertices of the outline that lie between two nodes'
+/// ribs, and ribs that meet on an edge share their vertex. A closed belt has no ends, and its last rib is its first,
+/// reversed after an odd number of half turns. Where ribs cross inside the board, against Eq. (33), there is no surface, and
+/// the triangles overlap.
 ///
 /// # Panics
 ///
@@ -54,7 +54,7 @@ pub fn mesh(spine: &Spine, n_across: usize) -> Mesh {
     builder.mesh
 }
 
-/// A rib as the mesh has it.
+/// A rib of the mesh.
 struct Row {
     foot: Foot,
     ends: [End; 2],
@@ -95,7 +95,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// All ribs, in the order of u; one that coincides with the one before is left out.
+    /// All ribs, in the order of u; a rib that coincides with the rib before is left out.
     fn rows(&mut self, n: usize) -> Vec<Row> {
         let mut rows: Vec<Row> = Vec::new();
         for (foot, closes_plate) in self.feet() {
@@ -135,7 +135,7 @@ impl<'a> Builder<'a> {
         feet
     }
 
-    /// The end vertices of the row before that the ends of the next rib fall on.
+    /// The end vertices of the previous row that coincide with the ends of the next rib, by side.
     fn shared_ends(&self, before: &Row, ends: &[End; 2]) -> [Option<u32>; 2] {
         let last = before.points.len() - 1;
         [(0, before.points[0]), (1, before.points[last])].map(|(side, vertex)| {
@@ -187,7 +187,7 @@ impl<'a> Builder<'a> {
         if !at_start {
             edge.reverse();
         }
-        // From the rib's end to the spine's, by the corner and back along the edge.
+        // The boundary goes from the rib's end to the spine's end, by the corner and back along the edge.
         let mut polygon = row.boundary();
         if side == 1 {
             polygon.reverse();
@@ -218,7 +218,7 @@ impl<'a> Builder<'a> {
         self.patch(polygon, [before, after].map(Row::u));
     }
 
-    /// Mean length of the elements: how finely arcs are divided where there are no ribs.
+    /// Mean length of the elements, the step in which arcs are divided where there are no ribs.
     fn step(&self) -> f64 {
         self.spine.length() / self.spine.elements().max(1) as f64
     }
@@ -230,7 +230,7 @@ impl<'a> Builder<'a> {
         self.vertex(foot.point.pose.transform(&point), flat)
     }
 
-    /// Triangles of a polygon in one plane, of vertices and where they ought to be but for the tolerance.
+    /// Adds the triangles of a polygon in one plane, given by its vertices and their exact flat positions.
     fn patch(&mut self, boundary: Vec<(u32, Vector2<f64>)>, span: [f64; 2]) {
         let (mut vertices, corners): (Vec<u32>, Vec<_>) = boundary.into_iter().unzip();
         let mut polygon = Polygon(corners);
@@ -243,7 +243,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Adds a triangle unless shared vertices have made it a line.
+    /// Adds a triangle unless shared vertices have reduced it to a line.
     fn triangle(&mut self, [a, b, c]: [u32; 3], span: [f64; 2]) {
         if a != b && b != c && c != a {
             self.mesh.triangles.push([a, b, c]);
@@ -252,7 +252,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// The mesh with its last row made one with its first.
+    /// The mesh with its last row merged into its first.
     fn closed(self, first: &Row, last: &Row, is_reversed: bool) -> Mesh {
         let mut onto = first.points.clone();
         if is_reversed {

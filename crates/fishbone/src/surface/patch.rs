@@ -8,7 +8,7 @@ use nalgebra::Vector2;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Polygon(pub(super) Vec<Vector2<f64>>);
 
-/// Chord of arcs in the polygon by which points are told inside from outside, in half widths.
+/// Distance of chords from arcs in the polygon that decides whether points are inside, in half widths.
 const FINE: f64 = 1e-3;
 
 impl Polygon {

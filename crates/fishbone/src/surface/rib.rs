@@ -12,7 +12,7 @@ use nalgebra::{Vector2, Vector3};
 /// Source: Eq. (31)
 ///
 /// Units: rad, in (−π/2, π/2)
-pub fn rib_angle(rib_slope: f64) -> f64 {
+pub(crate) fn rib_angle(rib_slope: f64) -> f64 {
     rib_slope.atan()
 }
 
@@ -35,14 +35,14 @@ pub fn rib_vector(pose: &Pose, rib_slope: f64) -> Vector3<f64> {
     pose.frame * Vector3::new(0.0, -rib_slope, 1.0) / 1f64.hypot(rib_slope)
 }
 
-/// Unit vector across a rib in the tangent plane, d₁ = η cos α + ζ sin α: where κ₁ bends.
+/// Unit vector across a rib in the tangent plane, d₁ = η cos α + ζ sin α, the direction of κ₁.
 ///
 /// The source prints ξ cos α + η sin α before Eq. (29), which does not lie in the surface.
 pub fn bend_vector(pose: &Pose, rib_slope: f64) -> Vector3<f64> {
     pose.frame * Vector3::new(0.0, 1.0, rib_slope) / 1f64.hypot(rib_slope)
 }
 
-/// Where the rib through P(u) meets the line v, as arc length along that line: u' = u − v β.
+/// Arc length, along the line v, at which the rib through P(u) meets this line: u' = u − v β.
 ///
 /// For v = +V/2 the source prints u + (V/2) tan α, which contradicts its Eq. (20).
 ///
@@ -58,7 +58,7 @@ pub fn rib_angle_rate_bound(rib_angle: f64, width: f64) -> f64 {
     2.0 * rib_angle.cos().powi(2) / width
 }
 
-/// A rib within the board: everything the surface needs to know of it.
+/// A rib within the board, with the data from which its points follow.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rib {
     /// Arc length of its foot on the spine.
@@ -69,9 +69,9 @@ pub struct Rib {
     pub flat: FlatFrame,
     /// Rib slope β.
     pub slope: f64,
-    /// Where it leaves the board on the −ζ side, v ≤ 0.
+    /// Coordinate of its end on the −ζ side, v ≤ 0.
     pub v_minus: f64,
-    /// Where it leaves the board on the +ζ side, v ≥ 0.
+    /// Coordinate of its end on the +ζ side, v ≥ 0.
     pub v_plus: f64,
 }
 
@@ -101,7 +101,7 @@ impl Rib {
     /// The point v of the rib, x(u) + v (ζ − β η).
     ///
     /// Source: Eq. (20), (21)
-    pub fn point(&self, v: f64) -> Vector3<f64> {
+    pub(crate) fn point(&self, v: f64) -> Vector3<f64> {
         self.pose.transform(&Vector3::new(0.0, -v * self.slope, v))
     }
 
@@ -111,7 +111,7 @@ impl Rib {
     }
 
     /// `n` values of v, evenly from the −ζ end to the +ζ end.
-    pub fn stations(&self, n: usize) -> impl Iterator<Item = f64> + use<> {
+    pub(crate) fn stations(&self, n: usize) -> impl Iterator<Item = f64> + use<> {
         let (minus, plus) = (self.v_minus, self.v_plus);
         (0..n).map(move |i| {
             let fraction = i as f64 / (n.max(2) - 1) as f64;
@@ -122,7 +122,7 @@ impl Rib {
 
 /// The ribs at all nodes, clipped to the board.
 ///
-/// At an end without a square rib they leave through the end line; the corner that no rib reaches is flat. Between
+/// At an end without a square rib the last ribs leave through the end line; the corner that no rib reaches is flat. Between
 /// two stiffeners joined at a corner the whole board is flat, and the nodes' ribs there are lines of its plane.
 ///
 /// # Panics

@@ -1,16 +1,16 @@
 //! Whether the bent belt passes through itself.
 //!
-//! The belt is taken as the triangles of its [`mesh`] between neighbouring ribs. Two of them cross where an edge of one
-//! pierces the other. Three things keep what only touches, and what only lies side by side, from being told as a
+//! The belt is taken as the triangles of its [`mesh`] between neighbouring ribs. Two triangles cross where an edge of one
+//! pierces the other. Three conditions keep sheets that only touch, or only lie side by side, from being reported as a
 //! crossing:
 //!
-//! - **Turn.** The line that is straight in the flat board turns, where the belt is bent, by no more than the normal ξ
-//!   turns from rib to rib, and along the board's inner edges by no more than the board itself. A closed curve with one
-//!   corner turns by π elsewhere. So places between which the belt turns by less than half a turn cannot meet, and
-//!   neighbours, ribs that meet on an edge, corners of the board and the seam of a closed belt need no care.
-//! - **Angle.** Sheets pass through each other where their normals differ by more than they turn within the two
-//!   triangles. Where they do not, elements are divided; sheets that cannot be told apart then lie on each other, as
-//!   the layers of a wound belt do.
+//! - **Turn.** A line that is straight in the flat board turns, where the belt is bent, by no more than the normal ξ turns
+//!   from rib to rib, and along the board's inner edges by no more than the board itself. A closed curve with one corner
+//!   turns by π elsewhere. So places between which the belt turns by less than half a turn cannot meet, and neighbours, ribs
+//!   that meet on an edge, corners of the board and the seam of a closed belt need no care.
+//! - **Angle.** Sheets pass through each other where their normals differ by more than they turn within the two triangles.
+//!   Where they do not, elements are divided; sheets that no division separates lie on each other, as the layers of a wound
+//!   belt do.
 //! - **Margin.** The belt is made narrower and shorter by a ten-thousandth of its width on all sides, so that an edge
 //!   or an end that rests against the belt, as exactly as a solver puts it there, stays clear.
 
@@ -19,10 +19,10 @@ use crate::strip::spine::{Piece, Spine, SpinePoint};
 use nalgebra::Vector3;
 use std::ops::Range;
 
-/// What is cut off on all sides, in widths: far above a solver's residuals, far below what is made.
+/// Margin cut off the belt on all sides, in widths: far above a solver's residuals, far below the tolerances of a made belt.
 const MARGIN: f64 = 1e-4;
 
-/// Turn between places that may meet: half a turn, less what the nodes leave uncertain.
+/// Least turn between places that may meet: half a turn, less the uncertainty of turns between nodes.
 ///
 /// Units: rad
 const LEAST_TURN: f64 = 3.0;
@@ -32,10 +32,11 @@ const LEAST_TURN: f64 = 3.0;
 /// Units: rad
 const LEAST_ANGLE: f64 = 1e-3;
 
-/// Parts into which elements are divided, one number after the other, until it is clear whether sheets cross.
+/// Parts into which each element is divided, a number for each attempt: tried in order until the sheets clearly cross or
+/// clearly do not.
 const PARTS: [usize; 3] = [1, 4, 16];
 
-/// Elements beyond which none are divided: so many turn by little as they are.
+/// Greatest count of elements after a division, a number: so many elements turn by little undivided.
 const MOST_ELEMENTS: usize = 1 << 12;
 
 /// Length, in widths, and turn up to which neighbouring elements are taken as one: slivers lie in boxes much larger than
@@ -44,16 +45,15 @@ const MOST_ELEMENTS: usize = 1 << 12;
 /// Units: 1, rad
 const FINEST: [f64; 2] = [1.0 / 32.0, 0.01];
 
-/// Where the bent belt passes through itself, as two arc lengths, those of the first place that another passes through
-/// and of that other; `None` where it does not.
+/// The first self-crossing of the bent belt, as the arc lengths of the two places that pass through each other; `None` where
+/// there is none.
 ///
-/// The arc lengths are the middles of the two elements, or parts of elements, that meet. The triangles lie off the
-/// bent belt by the sagitta of an element, |κ₁| h²/8, and nothing finer is told: what passes through itself less deep
-/// may be missed, an edge that passes another sheet closer than that may be taken to cross it. Sheets that lie on each
-/// other or touch do not count as crossing, nor do sheets that cross at less than a hundredth of a radian or than the
-/// turn of an element, of a sixteenth of one up to 256 elements, of a quarter up to 1024. What happens within 1e-4
-/// widths of the edges and the ends does not count either. Where ribs cross inside the board, against Eq. (33), there
-/// is no surface, and no certain answer.
+/// The arc lengths are the middles of the two elements, or parts of elements, that meet. The triangles lie off the bent belt
+/// by the sagitta of an element, |κ₁| h²/8, and the test resolves nothing finer: a shallower crossing may be missed, and an
+/// edge that passes another sheet closer than the sagitta may be reported as crossing it. Sheets that lie on each other or
+/// touch do not count as crossing, nor do sheets that cross at less than a hundredth of a radian or than the turn of an
+/// element, of a sixteenth of one up to 256 elements, of a quarter up to 1024. Nor do crossings within 1e-4 widths of the
+/// edges and the ends. Where ribs cross inside the board, against Eq. (33), there is no surface, and no certain answer.
 pub fn crosses_itself(spine: &Spine) -> Option<[f64; 2]> {
     for parts in PARTS {
         if parts > 1 && parts * spine.elements() > MOST_ELEMENTS {
@@ -68,15 +68,15 @@ pub fn crosses_itself(spine: &Spine) -> Option<[f64; 2]> {
     None
 }
 
-/// What is known of a belt that is divided so far.
+/// The outcome of the test at one division of the elements.
 enum Crossing {
     None,
-    /// Triangles cross, but at less than the angles by which the belt turns within them.
+    /// Triangles cross, but at smaller angles than the belt turns by within them.
     Doubtful,
     At([f64; 2]),
 }
 
-/// The first facet, in the order of u, that another one passes through.
+/// The first facet, in the order of u, with another facet that passes through it.
 fn first_crossing(spine: &Spine) -> Crossing {
     if spine.elements() == 0 {
         return Crossing::None;
@@ -87,7 +87,7 @@ fn first_crossing(spine: &Spine) -> Crossing {
     for facet in &facets {
         let mut is_crossed = |index: usize| {
             let is_across = facet.is_across(&facets[index]);
-            // One doubt is enough.
+            // One crossing in doubt is enough to ask for a finer division.
             let counts = is_across || !is_doubtful;
             let is_crossed = counts && facet.meets(&facets[index]);
             is_doubtful |= is_crossed && !is_across;
@@ -152,7 +152,7 @@ fn trimmed(spine: &Spine, parts: usize) -> Spine {
     }
 }
 
-/// The spine with neighbouring elements taken as one as far as they are short and turn little.
+/// The spine with neighbouring elements merged as long as the merged element is short and turns little.
 fn thinned(spine: &Spine, parts: usize) -> Spine {
     let turns = turns(spine);
     let [length, turn] = FINEST.map(|finest| finest / parts as f64);
@@ -192,7 +192,7 @@ fn point(spine: &Spine, element: usize, distance: f64) -> SpinePoint {
     }
 }
 
-/// How far the belt has turned at every node: the normal from rib to rib, and the board in its plane.
+/// Turn of the belt from its start to every node: of the normal from rib to rib, plus of the board in its plane.
 ///
 /// Units: rad
 fn turns(spine: &Spine) -> Vec<f64> {
@@ -208,9 +208,9 @@ fn turns(spine: &Spine) -> Vec<f64> {
     turns
 }
 
-/// The triangles of the belt in the order of u, and how far the whole belt turns.
+/// The triangles of the belt in the order of u, and the turn of the whole belt.
 ///
-/// In the axes of the start, to which the ribs of many belts are parallel: boxes along them are tight.
+/// Coordinates are in the axes of the start, to which the ribs of many belts are parallel: boxes along these axes are tight.
 fn facets(spine: &Spine) -> (Vec<Facet>, f64) {
     let (mesh, turns) = (mesh(spine, 2), turns(spine));
     let last = turns.len() - 1;
@@ -236,13 +236,13 @@ fn facets(spine: &Spine) -> (Vec<Facet>, f64) {
 #[derive(Debug)]
 struct Facet {
     corners: [Vector3<f64>; 3],
-    /// Arc lengths of the feet of the ribs that it lies between.
+    /// Arc lengths of the feet of the two ribs beside the triangle.
     u: [f64; 2],
-    /// How far the belt has turned, before it and after it.
+    /// Turn of the belt up to the rib before and the rib after the triangle.
     turn: [f64; 2],
-    /// The normal of the belt in its middle, of any length.
+    /// Normal of the belt in the middle of the triangle, of any length.
     normal: Vector3<f64>,
-    /// Angle by which the normal of the belt differs from that, at most.
+    /// Greatest angle within the triangle between the belt's normal and `normal`.
     spread: f64,
 }
 
@@ -264,7 +264,7 @@ impl Facet {
         [[a, b], [b, c], [c, a]]
     }
 
-    /// Whether an edge of one pierces the other.
+    /// Whether an edge of one triangle pierces the other.
     fn meets(&self, other: &Self) -> bool {
         let pierces = |a: &Self, b: &Self| a.edges().iter().any(|edge| b.is_pierced_by(edge));
         pierces(self, other) || pierces(other, self)
@@ -281,9 +281,11 @@ impl Facet {
 
     /// Whether an edge goes from one side of the triangle through it to the other.
     ///
-    /// A point of its plane counts to one side, always the same, so that a line of edges that passes through at a
-    /// vertex does so with one of them; the boundary is part of the triangle, and a little beyond against rounding.
+    /// A point of the triangle's plane counts to one side, always the same, so that of a line of edges that passes through
+    /// at a vertex exactly one pierces the triangle. The boundary is part of the triangle, widened a little against
+    /// rounding.
     fn is_pierced_by(&self, [p, q]: &[Vector3<f64>; 2]) -> bool {
+        /// Widening of the triangle against rounding, as a share of its doubled area.
         const SLACK: f64 = 1e-6;
         let [a, b, c] = &self.corners;
         let normal = (b - a).cross(&(c - a));
@@ -327,9 +329,10 @@ impl Bounds {
     }
 }
 
-/// Boxes around neighbours, around pairs of those, and so on: neighbours along the belt are neighbours in space.
+/// Boxes around neighbours, around pairs of neighbouring boxes, and so on: neighbours along the belt are neighbours in
+/// space.
 struct Tree {
-    /// The box of everything at 1, the halves of number k at 2k and 2k + 1.
+    /// The box of the whole belt at index 1, the two halves of box k at 2k and 2k + 1.
     bounds: Vec<Bounds>,
 }
 
@@ -354,7 +357,7 @@ impl Tree {
         self.find_below(1, 0..self.bounds.len() / 2, bounds, &range, is_wanted)
     }
 
-    /// The same among the leaves below one box.
+    /// The first wanted leaf of a range, among the leaves below one box, whose box overlaps another.
     fn find_below(
         &self,
         index: usize,

@@ -13,6 +13,7 @@ use proptest::prelude::*;
 use std::collections::{HashMap, HashSet};
 use std::f64::consts::{PI, TAU};
 
+/// Width of the test boards, in the unit of their length.
 const WIDTH: f64 = 0.1;
 
 /// Whether ribs keep clear of one another on the board.
@@ -110,7 +111,7 @@ fn distance_to_outline(spine: &Spine, point: &Vector2<f64>) -> f64 {
     curves.fold(f64::INFINITY, f64::min)
 }
 
-/// A disc, a ring or a Möbius band, its boundary on the outline, its flat area that of the outline but for its arcs.
+/// A disc, a ring or a Möbius band, its boundary on the outline, its flat area the outline's but for the arcs.
 fn assert_tiles_the_board(spine: &Spine, n_across: usize) {
     let mesh = mesh(spine, n_across);
     let is_odd = spine
@@ -366,7 +367,7 @@ fn test_inner_edge_of_a_tight_arc_ends_where_its_neighbours_meet() {
             &outline.minus
         };
         assert_eq!(inner.len(), 2);
-        // On the bisector beyond the centre: both offset lines pass (V/2 − R) from it.
+        // The vertex is on the bisector beyond the centre, from which both offset lines pass at (V/2 − R).
         let centre = Vector2::new(0.4, sign * radius);
         let bisector = Vector2::new(-(0.5 * turn).sin(), sign * (0.5 * turn).cos());
         let expected = centre + (0.05 - radius) / (0.5 * turn).cos() * bisector;
@@ -399,7 +400,7 @@ fn test_end_shorter_than_its_mitre_is_cut_by_the_edge_beyond() {
     let outline = outline(&spine);
     let [start, _] = outline.ends.unwrap();
     assert_eq!(start.first(), Vector2::new(0.0, -0.05));
-    // The line z cos χ − (y − 0.02) sin χ = V/2 at y = 0.
+    // The expected height is that of the line z cos χ − (y − 0.02) sin χ = V/2 at y = 0.
     let expected = (0.05 - 0.02 * 1.2f64.sin()) / 1.2f64.cos();
     assert_relative_eq!(start.last(), Vector2::new(0.0, expected), epsilon = 1e-15);
     assert_relative_eq!(outline.plus[0].first(), start.last(), epsilon = 1e-15);

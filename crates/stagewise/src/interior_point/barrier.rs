@@ -1,4 +1,4 @@
-//! The logarithmic barrier: what keeps slacks and their multipliers positive.
+//! The logarithmic barrier, which keeps slacks and their multipliers positive.
 
 use crate::layout::Layout;
 use crate::program::Values;
@@ -13,11 +13,11 @@ pub(crate) struct Barrier {
     weights: Vec<f64>,
     /// The largest weight of a stage.
     heaviest: f64,
-    /// Rows of every stage, then of every other inequality, by which logarithms are summed up.
+    /// Ranges of rows over which logarithms are summed: one range a stage, then one a row of the other inequalities.
     stages: Vec<std::ops::Range<usize>>,
 }
 
-/// Lengths that a step may go: along the unknowns, and along the inequalities' multipliers.
+/// Step lengths: of the unknowns, and of the inequalities' multipliers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Lengths {
     pub(crate) primal: f64,
@@ -71,13 +71,12 @@ impl Barrier {
         })
     }
 
-    /// The next lower parameter, at least `least`.
+    /// Lowers the parameter superlinearly, down to `least`.
     pub(crate) fn lower(&mut self, least: f64) {
         self.parameter = least.max((0.2 * self.parameter).min(self.parameter.powf(1.5)));
     }
 
-    /// Step of the multipliers along which every product comes to the central path, and the lengths that keep slacks and
-    /// multipliers positive.
+    /// Step of the multipliers toward the central path, and the step lengths that keep slacks and multipliers positive.
     pub(crate) fn find_step(
         &self,
         slacks: &[f64],
@@ -108,7 +107,7 @@ impl Barrier {
         lengths
     }
 
-    /// Moves multipliers along their step, and back where they lie too far from the central path.
+    /// Moves multipliers along their step, and resets a multiplier that is too far from the central path.
     pub(crate) fn advance(
         &self,
         slacks: &[f64],
@@ -116,6 +115,7 @@ impl Barrier {
         steps: &[f64],
         multipliers: &mut [f64],
     ) {
+        /// Ratio of a multiplier to its value on the central path beyond which it is reset; dimensionless.
         const SPREAD: f64 = 1e10;
         let rows = slacks.iter().zip(steps).zip(&self.weights);
         for (multiplier, ((slack, step), weight)) in multipliers.iter_mut().zip(rows) {

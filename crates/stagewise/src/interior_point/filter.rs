@@ -1,6 +1,6 @@
-//! The filter of the line search: which pairs of violation and merit have been left behind for good.
+//! The filter of the line search: pairs of violation and merit that no later point may be dominated by.
 
-/// What a point is judged by.
+/// Violation and merit of a point.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Measure {
     /// 1-norm of the constraint violation.
@@ -9,7 +9,7 @@ pub(super) struct Measure {
     pub(super) merit: f64,
 }
 
-/// Measures that no later point may be dominated by.
+/// The entries of the filter.
 #[derive(Debug, Clone)]
 pub(super) struct Filter {
     entries: Vec<Measure>,
@@ -17,12 +17,15 @@ pub(super) struct Filter {
     small: f64,
 }
 
+/// Margin of the filter in the violation, as a share of the violation; dimensionless.
 const VIOLATION_MARGIN: f64 = 1e-5;
+/// Margin of the filter in the merit, per unit violation; objective per unit violation.
 const MERIT_MARGIN: f64 = 1e-5;
+/// Ratio of the decrease of the merit to its linear prediction that is sufficient (Armijo); dimensionless.
 const SUFFICIENT: f64 = 1e-4;
 
 impl Filter {
-    /// A filter for a minimisation that starts with this violation.
+    /// A filter of a minimisation, by the violation of its start.
     pub(super) fn new(violation: f64) -> Self {
         Self {
             entries: Vec::new(),
@@ -31,18 +34,18 @@ impl Filter {
         }
     }
 
-    /// Whether nothing is remembered.
+    /// Whether the filter has no entries.
     pub(super) fn is_empty(&self) -> bool {
         self.entries.is_empty()
     }
 
-    /// Forgets all entries.
+    /// Removes all entries.
     pub(super) fn clear(&mut self) {
         self.entries.clear();
     }
 
-    /// Whether a trial point improves on the present one; remembers the present one where it is left for the sake of
-    /// the constraints.
+    /// Whether a trial point is acceptable from the present point. Adds the present point to the filter unless the step is a
+    /// descent of the merit.
     pub(super) fn takes(&mut self, now: Measure, trial: Measure, length: f64, slope: f64) -> bool {
         if !self.admits(trial) {
             return false;
@@ -60,7 +63,7 @@ impl Filter {
         better
     }
 
-    /// Remembers a point that is left for the sake of the constraints.
+    /// Adds a point to the filter, with its margins.
     pub(super) fn leave(&mut self, point: Measure) {
         self.entries.push(Measure {
             violation: (1.0 - VIOLATION_MARGIN) * point.violation,
@@ -68,7 +71,7 @@ impl Filter {
         });
     }
 
-    /// Whether no remembered point dominates this one.
+    /// Whether no entry dominates a point.
     pub(super) fn admits(&self, point: Measure) -> bool {
         let dominated = |entry: &Measure| {
             point.violation >= entry.violation && point.merit >= entry.merit + rounding(entry.merit)
@@ -79,7 +82,7 @@ impl Filter {
     }
 }
 
-/// Differences of the merit below this are rounding.
+/// Difference of merits that is rounding.
 fn rounding(merit: f64) -> f64 {
     10.0 * f64::EPSILON * merit.abs()
 }

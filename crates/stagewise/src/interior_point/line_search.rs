@@ -1,4 +1,4 @@
-//! The line search: the longest share of a step that the filter takes, with second-order corrections.
+//! The line search: the longest share of a step that the filter accepts, with second-order corrections.
 
 use super::barrier::Lengths;
 use super::{InteriorPoint, Measure, violation};
@@ -6,7 +6,7 @@ use crate::layout::Layout;
 use crate::linear::chain::NodeVector;
 use crate::program::Program;
 
-/// Room for second-order corrections.
+/// Work arrays of second-order corrections.
 pub(super) struct SecondOrderCorrection<const N: usize> {
     targets: Vec<f64>,
     plain_step: Vec<NodeVector<N>>,
@@ -26,13 +26,14 @@ impl<const N: usize> SecondOrderCorrection<N> {
 impl<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>
     InteriorPoint<'_, P, X, U, N>
 {
-    /// Shortens the step until the filter takes the trial point; false where it takes none.
+    /// Shortens the step until the filter accepts the trial point; false where no length is accepted.
     pub(super) fn search(&mut self) -> bool {
-        const SHORTEST: f64 = 1e-10;
+        /// Length of the shortest trial step, as a share of the Newton step; dimensionless.
+        const SHORTEST_STEP: f64 = 1e-10;
         let longest = self.iterate.find_inequality_step();
         let (now, slope) = (self.measure(&self.iterate.values), self.slope());
         let mut length = longest.primal;
-        while length > SHORTEST {
+        while length > SHORTEST_STEP {
             if self.iterate.try_step(length) {
                 let trial = self.measure(&self.iterate.trial_values);
                 let taken = self.filter.takes(now, trial, length, slope)
@@ -60,9 +61,12 @@ impl<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>
         along - iterate.kkt.equality_work(&iterate.multipliers.equalities)
     }
 
-    /// Second-order correction: bends the full step back to the equalities until the filter takes it.
+    /// Second-order corrections: correct the full step for the equalities at its end until the filter accepts the corrected
+    /// step; false where no correction is accepted.
     fn correct(&mut self, now: Measure, length: f64, slope: f64) -> bool {
-        const MOST: usize = 4;
+        /// Largest count of second-order corrections in one line search; a number.
+        const CORRECTIONS: usize = 4;
+        /// Ratio of successive violations above which corrections end; dimensionless.
         const CONTRACTION: f64 = 0.99;
         let Self {
             correction,
@@ -81,7 +85,7 @@ impl<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>
         let mut scale = length;
         let mut before = violation(layout, &iterate.trial_values);
         let mut taken = false;
-        for _ in 0..MOST {
+        for _ in 0..CORRECTIONS {
             let values = iterate.trial_values.equalities.iter();
             for (target, value) in correction.targets.iter_mut().zip(values) {
                 *target = *target * scale + value;

@@ -22,7 +22,7 @@ use std::ops::ControlFlow;
 pub struct Settings {
     /// Largest residual of a converged point.
     pub tolerance: f64,
-    /// Most iterations.
+    /// Largest count of iterations.
     pub iterations: usize,
     /// First barrier parameter, an objective per unit weight.
     pub barrier: f64,
@@ -37,13 +37,13 @@ pub enum Outcome {
     IterationLimit,
     /// The violation of the equalities cannot be lowered any further.
     LocallyInfeasible,
-    /// The equalities hold, and no step lowers the objective by more than rounding.
+    /// The equalities hold, and no step decreases the merit by more than rounding.
     Stalled,
     /// The objective is not bounded below, or not finite.
     Unbounded,
     /// The start is outside the domain.
     Inadmissible,
-    /// The caller asked to end.
+    /// The caller interrupted.
     Interrupted,
 }
 
@@ -59,7 +59,7 @@ pub struct Residuals {
 }
 
 impl Residuals {
-    /// The largest of the three; NaN where one of them is.
+    /// The largest residual; NaN where a residual is NaN.
     pub fn largest(&self) -> f64 {
         [self.stationarity, self.constraint, self.complementarity]
             .into_iter()
@@ -67,31 +67,31 @@ impl Residuals {
     }
 }
 
-/// Where the minimisation ended.
+/// Result of a minimisation.
 #[derive(Debug, Clone)]
 pub struct Solution<P> {
     /// The last point, with its multipliers.
     pub at: Stationary<P>,
-    /// Its values.
+    /// Values at the point.
     pub values: Values,
-    /// Residuals there.
+    /// Residuals at the point.
     pub residuals: Residuals,
-    /// Iterations taken.
+    /// Count of iterations.
     pub iterations: usize,
-    /// Why it ended.
+    /// Reason of the end.
     pub outcome: Outcome,
-    /// Inertia of the second variation there; `None` where it cannot be decided.
+    /// Inertia of the second variation at the point; `None` where it is undecided.
     pub inertia: Option<Inertia>,
 }
 
 impl<P> Solution<P> {
-    /// Whether it is a minimum, or not told from one.
+    /// Whether the point has converged and no direction of negative curvature is known.
     pub fn is_minimum(&self) -> bool {
         let descends = self.inertia.is_some_and(|inertia| inertia.negative > 0);
         self.outcome == Outcome::Converged && !descends
     }
 
-    /// The same with the iterations of an earlier search counted in.
+    /// The same result with the iterations of an earlier search added to its count.
     #[must_use]
     pub fn after(self, iterations: usize) -> Self {
         Self {
@@ -103,7 +103,7 @@ impl<P> Solution<P> {
 
 /// Minimises a programme from a point of its domain.
 ///
-/// `proceed` is asked once an iteration whether to go on.
+/// `proceed` is called once an iteration, and interrupts by `Break`.
 pub fn minimise<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>(
     program: &P,
     settings: &Settings,
@@ -115,7 +115,7 @@ pub fn minimise<P: Program<X, U, N>, const X: usize, const U: usize, const N: us
     interior_point.finish(outcome)
 }
 
-/// Residuals and inertia of a stationary point that was found by other means.
+/// Residuals and inertia of a given stationary point.
 pub fn assess<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>(
     program: &P,
     tolerance: f64,
@@ -137,14 +137,14 @@ pub fn assess<P: Program<X, U, N>, const X: usize, const U: usize, const N: usiz
     interior_point.finish(outcome)
 }
 
-/// An objective below minus this, in its unit, has no least.
-const BOTTOMLESS: f64 = 1e12;
+/// Depth of an objective that is unbounded below; in [`Scales::objective`](crate::Scales::objective).
+const UNBOUNDED: f64 = 1e12;
 
 /// A minimisation under way.
 struct InteriorPoint<'a, P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> {
     iterate: PrimalDual<&'a P, X, U, N>,
     settings: Settings,
-    /// Blocks of the equalities, by which their violation is summed up.
+    /// Layout, by whose blocks the violation of the equalities is summed.
     layout: Layout,
     bottom: f64,
     filter: Filter,
@@ -161,7 +161,7 @@ impl<'a, P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>
         let (iterate, admissible) = PrimalDual::new(program, settings.barrier, start);
         let layout = iterate.kkt.layout().clone();
         Self {
-            bottom: -BOTTOMLESS * program.scales().objective,
+            bottom: -UNBOUNDED * program.scales().objective,
             filter: Filter::new(violation(&layout, &iterate.values)),
             correction: SecondOrderCorrection::new(&layout),
             layout,
@@ -212,14 +212,14 @@ impl<'a, P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>
         }
     }
 
-    /// Asks the caller, who need not say so twice.
+    /// Whether the caller has interrupted, now or before.
     fn is_interrupted(&mut self, proceed: &mut dyn FnMut() -> ControlFlow<()>) -> bool {
         self.interrupted = self.interrupted || proceed().is_break();
         self.interrupted
     }
 
-    /// Goes on where the line search found nothing: toward the equalities, or where these hold without the filter's
-    /// memory; an outcome where neither is left.
+    /// Continues after a failed line search: by restoration where equalities are violated, else with an empty filter. Gives
+    /// an outcome where both fail.
     fn recover(&mut self, proceed: &mut dyn FnMut() -> ControlFlow<()>) -> Option<Outcome> {
         if violation(&self.layout, &self.iterate.values) > self.settings.tolerance {
             return (!self.restore(proceed)).then_some(Outcome::LocallyInfeasible);
@@ -232,11 +232,11 @@ impl<'a, P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>
         None
     }
 
-    /// Feasibility restoration: steps of least length toward the equalities until the filter takes the point; false where
-    /// their violation cannot be lowered.
+    /// Feasibility restoration: steps of least length toward the equalities until the filter accepts the point; false where
+    /// no step lowers the violation of the equalities.
     fn restore(&mut self, proceed: &mut dyn FnMut() -> ControlFlow<()>) -> bool {
-        /// Share of the violation that is left where restoration may end.
-        const ENOUGH: f64 = 0.1;
+        /// Share of the violation that is left where restoration may end; dimensionless.
+        const VIOLATION_LEFT: f64 = 0.1;
         let left = self.measure(&self.iterate.values);
         self.filter.leave(left);
         self.iterate.multipliers.equalities.fill(0.0);
@@ -249,7 +249,7 @@ impl<'a, P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>
                 return false;
             }
             let now = self.measure(&self.iterate.values);
-            if now.violation <= ENOUGH * left.violation && self.filter.admits(now) {
+            if now.violation <= VIOLATION_LEFT * left.violation && self.filter.admits(now) {
                 self.iterate.centre();
                 return true;
             }
@@ -274,19 +274,21 @@ impl<'a, P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>
         }
     }
 
-    /// Drops multipliers that stationarity does not need: where equalities depend on each other they are not unique.
+    /// Sets the equalities' multipliers to zero where the point is stationary without them: multipliers of redundant
+    /// equalities are not unique.
     ///
-    /// A loose tolerance must not do so: it would call small forces none.
+    /// A loose tolerance does not apply here: it would drop small multipliers that are unique.
     fn prefer_zero_multipliers(&mut self) {
-        const NONE: f64 = 1e-8;
+        /// Stationarity residual at which the multipliers of the equalities are zero; in the unit of the gradient.
+        const NEGLIGIBLE: f64 = 1e-8;
         let iterate = &mut self.iterate;
-        if iterate.stationarity_without_equalities() <= NONE.min(self.settings.tolerance) {
+        if iterate.stationarity_without_equalities() <= NEGLIGIBLE.min(self.settings.tolerance) {
             iterate.multipliers.equalities.fill(0.0);
             iterate.linearise();
         }
     }
 
-    /// Violation and barrier function of some values.
+    /// Violation and barrier function of values.
     fn measure(&self, values: &Values) -> Measure {
         Measure {
             violation: violation(&self.layout, values),

@@ -7,7 +7,7 @@ use crate::linear::{Inertia, Kkt};
 use crate::program::{Multipliers, Program, Scales, Values};
 use crate::{largest, largest_entry};
 
-/// A point and its multipliers, the derivatives there, the step from there, and where that leads.
+/// A point with its multipliers, the derivatives and the Newton step at the point, and the trial point.
 pub(crate) struct PrimalDual<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> {
     pub(crate) program: P,
     pub(crate) point: P::Point,
@@ -15,7 +15,7 @@ pub(crate) struct PrimalDual<P: Program<X, U, N>, const X: usize, const U: usize
     pub(crate) multipliers: Multipliers,
     pub(crate) barrier: Barrier,
     pub(crate) kkt: Kkt<X, U, N>,
-    /// Gradient of the barrier problem's Lagrangian, where the step was found.
+    /// Gradient of the barrier problem's Lagrangian at the point.
     pub(crate) gradient: Vec<NodeVector<N>>,
     pub(crate) trial_values: Values,
     trial: P::Point,
@@ -26,7 +26,7 @@ pub(crate) struct PrimalDual<P: Program<X, U, N>, const X: usize, const U: usize
 }
 
 impl<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> PrimalDual<P, X, U, N> {
-    /// At a point, with the inequalities' multipliers on the central path; and whether the point is admissible.
+    /// The iterate at a point, with the inequalities' multipliers on the central path, and whether the point is admissible.
     pub(crate) fn new(program: P, barrier: f64, mut point: P::Point) -> (Self, bool) {
         let kkt = Kkt::new(program.layout());
         let mut values = Values::default();
@@ -60,7 +60,7 @@ impl<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> Primal
         }
     }
 
-    /// Finds the derivatives at the point.
+    /// Evaluates the derivatives at the point.
     pub(crate) fn linearise(&mut self) {
         self.kkt
             .linearise(&self.program, &self.point, &self.multipliers);
@@ -82,7 +82,7 @@ impl<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> Primal
         }
     }
 
-    /// The stationarity that would be left if the equalities' multipliers were zero.
+    /// Stationarity residual with the equalities' multipliers at zero.
     pub(crate) fn stationarity_without_equalities(&mut self) -> f64 {
         self.gradient.copy_from_slice(&self.kkt.linear.gradient);
         self.kkt
@@ -90,7 +90,7 @@ impl<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> Primal
         self.stationarity()
     }
 
-    /// Largest entry of the gradient once the inequalities' multipliers are taken off.
+    /// Largest entry of the gradient less the inequalities' multipliers times their gradients.
     fn stationarity(&mut self) -> f64 {
         let multipliers = &self.multipliers.inequalities;
         let linear = &self.kkt.linear;
@@ -105,9 +105,10 @@ impl<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> Primal
             .complementarity(parameter, &self.values.slacks, multipliers)
     }
 
-    /// Lowers the barrier while its problem is solved well enough, and says whether it did; `residuals` are those without a
-    /// barrier.
+    /// Lowers the barrier parameter while the barrier problem is solved; gives whether the parameter was lowered. `residuals`
+    /// are those without a barrier.
     pub(crate) fn lower_barrier(&mut self, residuals: &Residuals, tolerance: f64) -> bool {
+        /// Ratio of residual to barrier parameter at which a barrier problem counts as solved; dimensionless.
         const SOLVED: f64 = 10.0;
         let heaviest = self.barrier.heaviest();
         let least = 0.1 * tolerance / heaviest;
@@ -126,7 +127,7 @@ impl<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> Primal
         }
     }
 
-    /// Inertia of the second variation; the derivatives are not to be relied on afterwards.
+    /// Inertia of the second variation. Overwrites the derivatives.
     pub(crate) fn inertia(&mut self) -> Option<Inertia> {
         let metric = self.program.metric(&self.point);
         let multipliers = &self.multipliers.inequalities;
@@ -170,7 +171,7 @@ impl<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> Primal
             .evaluate(&mut self.trial, &mut self.trial_values)
     }
 
-    /// The same along the step of another system.
+    /// Evaluates the trial point along a step of another system; false outside the domain.
     pub(crate) fn try_along(&mut self, step: &[NodeVector<N>], length: f64) -> bool {
         self.program
             .retract(&self.point, step, length, &mut self.trial);
@@ -178,7 +179,7 @@ impl<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> Primal
             .evaluate(&mut self.trial, &mut self.trial_values)
     }
 
-    /// Takes the trial point and moves the multipliers along.
+    /// Makes the trial point the point, and moves the multipliers along their step.
     pub(crate) fn accept(&mut self, lengths: Lengths) {
         self.take_trial();
         let steps = self.kkt.multiplier_step.iter();

@@ -1,4 +1,4 @@
-//! Feasibility restoration: a problem of its own, that of the shortest step toward the equalities under the barrier.
+//! Feasibility restoration: the problem of the shortest step toward the equalities, under the barrier.
 
 use super::primal_dual::PrimalDual;
 use super::violation;
@@ -23,13 +23,15 @@ impl<const X: usize, const U: usize, const N: usize> Restoration<X, U, N> {
         }
     }
 
-    /// Moves a point by one step of least length toward the equalities, shortened until their violation falls; false where
-    /// it does not.
+    /// Moves a point by one step of least length toward the equalities, shortened until their violation decreases; false
+    /// where no length decreases the violation.
     pub(super) fn step<P: Program<X, U, N>>(
         &mut self,
         iterate: &mut PrimalDual<P, X, U, N>,
     ) -> bool {
-        const SHORTEST: f64 = 1e-8;
+        /// Length of the shortest trial step, as a share of the restoration step; dimensionless.
+        const SHORTEST_STEP: f64 = 1e-8;
+        /// Ratio of the decrease of the violation to its linear prediction that is sufficient (Armijo); dimensionless.
         const SUFFICIENT: f64 = 1e-4;
         self.kkt
             .linearise(&iterate.program, &iterate.point, &iterate.multipliers);
@@ -50,7 +52,7 @@ impl<const X: usize, const U: usize, const N: usize> Restoration<X, U, N> {
             .find_step(&self.gradient, &iterate.values.equalities);
         let before = violation(self.kkt.layout(), &iterate.values);
         let mut length = self.longest(iterate);
-        while length > SHORTEST {
+        while length > SHORTEST_STEP {
             if iterate.try_along(&self.kkt.step, length)
                 && violation(self.kkt.layout(), &iterate.trial_values)
                     <= (1.0 - SUFFICIENT * length) * before
@@ -63,7 +65,7 @@ impl<const X: usize, const U: usize, const N: usize> Restoration<X, U, N> {
         false
     }
 
-    /// The longest step that keeps the slacks positive.
+    /// The largest step length that keeps the slacks positive.
     fn longest<P: Program<X, U, N>>(&mut self, iterate: &PrimalDual<P, X, U, N>) -> f64 {
         self.kkt.slack_rates(&mut self.rates);
         let mut steps = vec![0.0; self.rates.len()];

@@ -1,32 +1,35 @@
-//! The second variation at a solution: in how many directions it is negative, and in how many it vanishes.
+//! Inertia of the second variation at a solution, on the tangent space of the equalities and the active inequalities.
 //!
-//! Of the directions that the equalities and the active inequalities leave. It is counted, not sampled: the factorisation of
-//! a symmetric matrix has as many negative pivots as the matrix has negative eigenvalues.
+//! By Sylvester's law of inertia, the factorisation of a symmetric matrix has as many negative pivots as the matrix has
+//! negative eigenvalues.
 
 use super::chain::ByControls;
 use super::kkt::Kkt;
-use crate::program::{Linearisation, Scales, Values};
+use crate::linearisation::Linearisation;
+use crate::program::{Scales, Values};
 use nalgebra::SMatrix;
 
-/// Eigenvalues below this, in the unit of [`Scales::eigenvalue`], are not told from zero.
+/// Eigenvalue below which the second variation is zero; in [`Scales::eigenvalue`].
 const ZERO: f64 = 1e-2;
-/// An inequality is active where its multiplier per weight is so many times its slack, and is inactive the other way round.
+/// Ratio of multiplier per weight to slack above which an inequality is clearly active, and below the inverse of which it is
+/// clearly inactive; multiplier per weight and slack.
 const CLEAR: f64 = 100.0;
 
 /// Numbers of eigenvalues of the second variation by their sign.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Inertia {
-    /// Negative ones.
+    /// Number of negative eigenvalues.
     pub negative: usize,
-    /// Those that are not told from zero.
+    /// Number of eigenvalues near zero, of either sign.
     pub zero: usize,
-    /// Controls that neither move nor cost anything, and are in neither number.
+    /// Number of cost-free controls, along which neither state nor objective changes; they are in neither of the other
+    /// numbers.
     pub cost_free: usize,
 }
 
 impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
     /// Inertia of the second variation; `None` where it depends on inequalities that are neither clearly active nor clearly
-    /// inactive. The derivatives are not to be relied on afterwards.
+    /// inactive. Overwrites the derivatives.
     pub(crate) fn inertia(
         &mut self,
         values: &Values,
@@ -58,7 +61,7 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
 }
 
 impl<const X: usize, const U: usize, const N: usize> Linearisation<X, U, N> {
-    /// Holds the controls that neither move anything nor cost anything to second order, and counts them.
+    /// Locks the cost-free controls, which change neither a state nor the objective to second order, and counts them.
     pub(super) fn hold_cost_free_controls(&mut self) -> usize {
         let mut cost_free = self.cost_free_controls();
         for (k, stage) in self.chain.stages.iter().enumerate().rev() {
@@ -79,9 +82,10 @@ impl<const X: usize, const U: usize, const N: usize> Linearisation<X, U, N> {
         held
     }
 
-    /// Of every node, which controls have derivatives far below the largest of any stage.
+    /// The cost-free controls of every node: those whose derivatives are far below the largest of all.
     fn cost_free_controls(&self) -> Vec<[bool; U]> {
-        const NOTHING: f64 = 1e-8;
+        /// Ratio to the largest derivative of any control below which a control is cost-free; dimensionless.
+        const COST_FREE: f64 = 1e-8;
         let stages = self.chain.stages.iter().zip(&self.diagonal.controls);
         let mut most = vec![[0.0; U]; self.chain.stages.len() + 1];
         let mut largest: f64 = 0.0;
@@ -113,7 +117,24 @@ impl<const X: usize, const U: usize, const N: usize> Linearisation<X, U, N> {
                 *most = f64::max(*most, term.hessian.column(X + i).amax());
             }
         }
-        let is_cost_free = |most: f64| most <= NOTHING * largest;
+        for (nodes, hessian) in self.pair_hessians() {
+            let [first, second] = nodes;
+            for i in X..N {
+                let by_first = hessian
+                    .first
+                    .column(i)
+                    .amax()
+                    .max(hessian.mixed.row(i).amax());
+                let by_second = hessian
+                    .second
+                    .column(i)
+                    .amax()
+                    .max(hessian.mixed.column(i).amax());
+                most[first][i - X] = by_first.max(most[first][i - X]);
+                most[second][i - X] = by_second.max(most[second][i - X]);
+            }
+        }
+        let is_cost_free = |most: f64| most <= COST_FREE * largest;
         most.iter().map(|most| most.map(is_cost_free)).collect()
     }
 }

@@ -8,45 +8,52 @@
 //! ```
 //!
 //! H is the second derivative of the Lagrangian, J and S the gradients of equalities and slacks, s the slacks and ν their
-//! multipliers. Inequalities of stages and nodes are folded into H; inequalities between pairs are rows of the border.
+//! multipliers. Inequalities of stages and nodes are folded into H; inequalities between pairs are rows of the border, and so
+//! are the second derivatives of constraints between pairs, which the chain has no place for.
+
+#[cfg(test)]
+mod tests;
 
 use super::TooConcave;
 use super::border::{Border, Row};
 use super::chain::{Diagonal, Factor, NodeMatrix, NodeVector};
 use crate::larger;
-use crate::layout::Layout;
-use crate::program::{Linearisation, Multipliers, Program, Values, product};
+use crate::layout::{Block, Layout};
+use crate::linearisation::{Linearisation, product};
+use crate::program::{Multipliers, Program, Values};
 use nalgebra::SMatrix;
 use std::ops::Range;
 
-/// Compliance lent to the equalities so that the chain can be factorised without them; refinement takes it back.
+/// Compliance of the springs that stand for equalities in the chain; equality per unit multiplier.
 const COMPLIANCE: f64 = 1e-7;
-/// Most times that equalities are met again by what the step still misses of them.
+/// Largest count of refinements by which springs become rigid; a number.
 const REFINEMENTS: usize = 2;
-/// Miss of the equalities along a step that is rounding.
+/// Residual of the linearised equalities that is rounding; in the unit of the equalities.
 const EXACT: f64 = 1e-12;
 
-/// A factorised system and its solution, with the room that both take.
+/// A factorised system and its solution, with their work arrays.
 #[derive(Debug, Clone)]
 pub(crate) struct Kkt<const X: usize, const U: usize, const N: usize> {
     /// Derivatives of the programme.
     pub(crate) linear: Linearisation<X, U, N>,
-    /// Stiffness of every inequality: multiplier over slack as they were assembled; zero of those left out.
+    /// Stiffness of every inequality: multiplier over slack at the assembly; zero of an inequality that is left out.
     pub(crate) stiffness: Vec<f64>,
     diagonal: Diagonal<X, U, N>,
     factor: Factor<U, N>,
-    /// Equalities between pairs, then inequalities between pairs.
+    /// Equalities between pairs, inequalities between pairs, then the squares in the second derivatives of both.
     border: Border<N>,
-    /// All equalities as rows of a border, then the inequalities between pairs, where they are so.
+    /// The border of the exact factorisation: all equalities, then the other rows of pairs.
     exact: Option<Border<N>>,
     node_weights: Vec<f64>,
     damping: f64,
     right: Vec<NodeVector<N>>,
-    /// Pull of the springs: zero but at the nodes of equalities.
+    /// Force of the springs, nonzero at the nodes of equalities only.
     pulls: Vec<NodeVector<N>>,
     correction: Vec<NodeVector<N>>,
-    /// Forces that the inequalities between pairs take along the step.
+    /// Multipliers along the step of the rows of pairs that are not equalities.
     pair_forces: Vec<f64>,
+    /// Right-hand side of the inequalities between pairs: the third row of the system is `S step − s/ν κ = −pair_targets`.
+    pub(crate) pair_targets: Vec<f64>,
     rates: Vec<f64>,
     /// Step of the unknowns.
     pub(crate) step: Vec<NodeVector<N>>,
@@ -59,13 +66,14 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         let zeros = vec![NodeVector::zeros(); layout.nodes()];
         let linear = Linearisation::new(layout);
         let layout = linear.layout();
-        let equalities = layout.equalities_between().iter();
-        let inequalities = layout.inequalities_between().iter();
-        let pairs = equalities.chain(inequalities);
-        let rows = pairs
-            .flat_map(|block| vec![Row::between(block.at, [NodeVector::zeros(); 2]); block.rows]);
+        let rows = |blocks: &[Block<[usize; 2]>], is_equality: bool| {
+            let rows = |block: &Block<_>| vec![Row::between(block.at, is_equality); block.rows];
+            blocks.iter().flat_map(rows).collect::<Vec<_>>()
+        };
+        let mut pairs = rows(layout.equalities_between(), true);
+        pairs.extend(rows(layout.inequalities_between(), false));
         Self {
-            border: Border::new(rows.collect(), layout.nodes()),
+            border: Border::new(pairs, layout.nodes()),
             exact: None,
             stiffness: vec![0.0; layout.inequalities()],
             diagonal: linear.diagonal.clone(),
@@ -76,6 +84,7 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
             pulls: zeros.clone(),
             correction: zeros.clone(),
             pair_forces: vec![0.0; linear.pair_slacks.len()],
+            pair_targets: vec![0.0; linear.pair_slacks.len()],
             rates: vec![0.0; layout.equalities()],
             multiplier_step: vec![0.0; layout.equalities()],
             step: zeros,
@@ -88,7 +97,7 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         self.linear.layout()
     }
 
-    /// Takes over the derivatives of a programme at a point.
+    /// Evaluates the derivatives of a programme at a point.
     pub(crate) fn linearise<P: Program<X, U, N>>(
         &mut self,
         program: &P,
@@ -103,7 +112,7 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         self.assemble_where(values, multipliers, |_, _| true);
     }
 
-    /// The same with the inequalities left out of which `counts(slack, multiplier per weight)` is false.
+    /// Assembles with those inequalities only of which `counts(slack, multiplier per weight)` is true.
     pub(crate) fn assemble_where(
         &mut self,
         values: &Values,
@@ -165,10 +174,10 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         for (row, by) in equalities.iter_mut().zip(&linear.equalities_between) {
             row.by = *by;
         }
-        let first = linear.layout().inequalities() - linear.pair_slacks.len();
+        let first = linear.layout().first_pair_row();
         let slacks = linear.pair_slacks.iter().zip(&self.stiffness[first..]);
         for (row, (by, stiffness)) in inequalities.iter_mut().zip(slacks) {
-            // A row that is left out takes no part: it is zero.
+            // The row of an inequality that is left out is zero.
             let counted = *stiffness != 0.0;
             row.by = if counted {
                 *by
@@ -177,20 +186,37 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
             };
             row.compliance = if counted { stiffness.recip() } else { 0.0 };
         }
+        let constraints = linear.equalities_between.len() + linear.pair_slacks.len();
+        if constraints > 0 {
+            let squares = linear.pair_hessians().flat_map(|(nodes, hessian)| {
+                let squares = hessian.squares().into_iter();
+                squares.map(move |square| Row::square(nodes, square))
+            });
+            self.border.replace_beyond(constraints, squares);
+            let multipliers = self.border.rows.len() - linear.equalities_between.len();
+            self.pair_forces.resize(multipliers, 0.0);
+        }
     }
 
-    /// Factorises with just enough damping to be convex on the tangent space of the equalities.
+    /// Factorises with the least damping tried that makes the second derivative positive on the tangent space of the
+    /// equalities.
     ///
     /// Errors: [`TooConcave`] where no damping is enough.
     pub(crate) fn factorise(&mut self) -> Result<(), TooConcave> {
-        const FIRST: f64 = 1e-4;
-        const MOST: f64 = 1e12;
+        /// Damping that is tried first where none is known; second derivative per unit weight.
+        const FIRST_DAMPING: f64 = 1e-4;
+        /// Damping beyond which a programme counts as unbounded; second derivative per unit weight.
+        const MOST_DAMPING: f64 = 1e12;
         if self.factorise_damped(0.0).is_ok() {
             return Ok(());
         }
         let known = self.damping > 0.0;
-        let mut damping = if known { self.damping / 3.0 } else { FIRST };
-        while damping < MOST {
+        let mut damping = if known {
+            self.damping / 3.0
+        } else {
+            FIRST_DAMPING
+        };
+        while damping < MOST_DAMPING {
             if self.factorise_damped(damping).is_ok() {
                 self.damping = damping;
                 return Ok(());
@@ -202,41 +228,41 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
 
     /// Factorises with a given damping of the controls per unit weight.
     ///
-    /// Errors: [`TooConcave`] where it is concave in any direction that the equalities leave.
+    /// Errors: [`TooConcave`] where the second derivative is not positive on the tangent space of the equalities.
     pub(crate) fn factorise_damped(&mut self, damping: f64) -> Result<(), TooConcave> {
         self.exact = None;
         let (chain, factor) = (&self.linear.chain, &mut self.factor);
         let most = self.border.rows.len();
         let concave = chain.factorise(&self.diagonal, damping, &self.node_weights, most, factor)?;
         let held = self.border.factorise(chain, factor, COMPLIANCE)?;
-        match concave == held {
+        match concave + self.border.concave_rows() == held {
             true => Ok(()),
             false => Err(TooConcave),
         }
     }
 
-    /// Factorises, however concave; gives the number of negative directions among those that the equalities leave.
+    /// Factorises a second derivative of any inertia; gives its number of negative eigenvalues on the tangent space of the
+    /// equalities.
     ///
-    /// The springs that stand for the equalities could not be made rigid by refinement where the second derivative all but
-    /// vanishes in some direction. So the equalities are rows of the border here.
+    /// The equalities are rows of the border here: where the second derivative is nearly singular, refinement does not make
+    /// springs rigid.
     ///
-    /// Errors: [`TooConcave`] where the chain has a direction of no curvature.
+    /// Errors: [`TooConcave`] where the chain has a direction of zero curvature.
     pub(crate) fn factorise_exactly(&mut self) -> Result<usize, TooConcave> {
-        let concave = self.factorise_chain()?;
+        let concave = self.factorise_chain()? + self.border.concave_rows();
         let mut border = self.all_rows();
         let held = border.factorise(&self.linear.chain, &mut self.factor, 0.0)?;
         self.exact = Some(border);
         Ok(concave.saturating_sub(held))
     }
 
-    /// The number of directions, of those that the equalities leave, in which the second derivative as assembled is negative.
+    /// Number of negative eigenvalues of the assembled second derivative on the tangent space of the equalities.
     ///
-    /// With the equalities as springs the count can only be too large: the directions that they hold, as they are rigid, are
-    /// taken off.
+    /// Springs in place of equalities can only raise the count: the directions that rigid equalities hold are subtracted.
     ///
-    /// Errors: [`TooConcave`] where there is a direction of no curvature.
+    /// Errors: [`TooConcave`] where there is a direction of zero curvature.
     pub(crate) fn count_negative(&mut self) -> Result<usize, TooConcave> {
-        let concave = self.factorise_chain()?;
+        let concave = self.factorise_chain()? + self.border.concave_rows();
         if concave == 0 {
             return Ok(0);
         }
@@ -250,7 +276,7 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         chain.factorise(&self.diagonal, 0.0, &self.node_weights, usize::MAX, factor)
     }
 
-    /// A border of all equalities and of the inequalities between pairs.
+    /// A border of all equalities and of the other rows of pairs.
     fn all_rows(&self) -> Border<N> {
         let mut by = self.linear.equalities_at.iter();
         let blocks = self.layout().equalities_at().iter();
@@ -266,8 +292,8 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         Border::new(rows, self.layout().nodes())
     }
 
-    /// The change of every equality under a unit multiplier of every other, where the unknowns cost their squares alone;
-    /// `None` where that cannot be factorised.
+    /// Compliance matrix of the equalities where the second derivative by the unknowns is the identity; `None` where the
+    /// factorisation fails.
     pub(crate) fn compliance_of_equalities(&mut self) -> Option<nalgebra::DMatrix<f64>> {
         let stages = self.layout().stages();
         let weights = vec![1.0 / stages as f64; stages + 1];
@@ -282,15 +308,15 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         Some(border.compliance(&self.linear.chain, &mut self.factor, 0.0))
     }
 
-    /// Takes a multiple of a metric off the second derivatives as assembled.
+    /// Subtracts a multiple of a metric from the assembled second derivatives.
     pub(crate) fn shift(&mut self, metric: &[SMatrix<f64, X, X>], by: f64) {
         self.diagonal.shift(metric, by);
     }
 
     /// Finds the step of least cost along which the equalities change by `−targets`, and the step of their multipliers.
     ///
-    /// The springs that stand for the equalities give way a little; pulling again by what is still missing (the method of
-    /// multipliers on the quadratic programme) makes them rigid.
+    /// The springs in place of equalities have a compliance. Refinement by the remaining residual, the method of multipliers
+    /// on the quadratic programme, makes them rigid.
     pub(crate) fn find_step(&mut self, gradient: &[NodeVector<N>], targets: &[f64]) {
         if let Some(border) = self.exact.take() {
             self.find_step_exactly(&border, gradient, targets);
@@ -327,7 +353,7 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         self.take_missing_at_nodes(targets_at);
     }
 
-    /// Adds the springs' pull by the targets at nodes to the right-hand side.
+    /// Adds the springs' forces by the targets at nodes to the right-hand side.
     fn pull_at_nodes(&mut self, targets: &[f64]) {
         let mut rows = self.linear.equalities_at.iter().zip(targets);
         for block in self.linear.layout().equalities_at() {
@@ -339,7 +365,7 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         }
     }
 
-    /// Finds the springs' pull by what the step misses of the targets at nodes.
+    /// Computes the springs' forces by the residual of the equalities at nodes.
     fn pull_again_at_nodes(&mut self, targets: &[f64]) {
         let layout = self.linear.layout();
         for block in layout.equalities_at() {
@@ -355,8 +381,8 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         }
     }
 
-    /// Adds what the step misses of the targets at nodes, as forces of the springs, to the multipliers' step; gives the
-    /// largest miss.
+    /// Adds the springs' forces by the residual of the equalities at nodes to the multipliers' step; gives the largest
+    /// residual.
     fn take_missing_at_nodes(&mut self, targets: &[f64]) -> f64 {
         let mut most: f64 = 0.0;
         let mut rows = self.linear.equalities_at.iter().zip(targets);
@@ -371,7 +397,7 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         most
     }
 
-    /// Bends the correction of a step, or of none yet, to the rows between pairs.
+    /// Corrects the correction of a step for the rows between pairs; `None` is a step of zero.
     fn correct_pairs(&mut self, targets: &[f64], step: Option<&[NodeVector<N>]>) {
         if self.border.rows.is_empty() {
             return;
@@ -382,6 +408,9 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         };
         let (equalities, inequalities) = missing.split_at_mut(targets.len());
         for (missing, target) in equalities.iter_mut().zip(targets) {
+            *missing += target;
+        }
+        for (missing, target) in inequalities.iter_mut().zip(&self.pair_targets) {
             *missing += target;
         }
         let rows = &self.border.rows[targets.len()..];
@@ -399,7 +428,7 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         }
     }
 
-    /// The same where all equalities are rows of a border.
+    /// Finds the step where all equalities are rows of a border.
     fn find_step_exactly(
         &mut self,
         border: &Border<N>,
@@ -412,18 +441,17 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         self.linear
             .chain
             .solve(&mut self.factor, &self.right, &mut self.step);
-        let all: Vec<f64> = targets
-            .iter()
-            .copied()
-            .chain(self.pair_forces.iter().map(|_| 0.0))
-            .collect();
+        let mut all = targets.to_vec();
+        all.extend(&self.pair_targets);
+        all.resize(border.rows.len(), 0.0);
         let forces = border.correct(&all, &mut self.step);
-        self.multiplier_step
-            .copy_from_slice(&forces.as_slice()[..targets.len()]);
+        let (equalities, others) = forces.as_slice().split_at(targets.len());
+        self.multiplier_step.copy_from_slice(equalities);
+        self.pair_forces.copy_from_slice(others);
         self.take_missing_at_nodes(targets_at);
     }
 
-    /// Takes the pull of the equalities' multipliers off a gradient by the unknowns.
+    /// Subtracts the equalities' multipliers times their gradients from a gradient by the unknowns.
     pub(crate) fn take_off_pulls(&mut self, multipliers: &[f64], gradient: &mut [NodeVector<N>]) {
         self.right.fill(NodeVector::zeros());
         self.linear
@@ -432,6 +460,11 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         for (gradient, pull) in gradient.iter_mut().zip(&self.right) {
             *gradient -= pull;
         }
+    }
+
+    /// Multipliers along the step of the inequalities between pairs: stiffness times the change of their slacks.
+    pub(crate) fn pair_forces(&self) -> &[f64] {
+        &self.pair_forces[..self.linear.pair_slacks.len()]
     }
 
     /// Change of every slack along the step, to first order.

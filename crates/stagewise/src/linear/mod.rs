@@ -1,11 +1,12 @@
-//! Linear algebra on the chain: recursion along it, a border for what ties pairs of nodes, and what is counted and solved
-//! with both.
+//! Linear algebra on the chain: recursion along the chain, a border for constraints between pairs of nodes, and inertia,
+//! modes and responses by both.
 
 mod border;
 pub(crate) mod chain;
 mod inertia;
 mod kkt;
 pub(crate) mod modes;
+mod pair_matrix;
 mod rank;
 mod response;
 mod small;
@@ -14,9 +15,10 @@ pub use inertia::Inertia;
 pub(crate) use kkt::Kkt;
 pub(crate) use modes::lowest_modes_of;
 pub use modes::{Mode, lowest_modes, moved};
+pub use pair_matrix::{PairMatrix, StageMatrix};
 pub use rank::redundant_equalities;
 pub use response::{Direction, Response, Singular};
 
-/// The objective has more directions of negative curvature than allowed, or one of none.
+/// The objective has more directions of negative curvature than allowed, or a direction of zero curvature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct TooConcave;
+pub(crate) struct TooConcave;

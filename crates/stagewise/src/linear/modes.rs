@@ -1,26 +1,26 @@
-//! Eigenvectors of the second variation, the lowest ones.
+//! The lowest eigenvectors of the second variation.
 
 use super::chain::NodeVector;
 use super::response::{Response, Singular};
 use crate::program::{Program, Scales, Stationary};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-/// A direction that the constraints leave, in which the second variation is a multiple of the metric.
+/// An eigenvector of the second variation relative to the metric, on the tangent space of the constraints.
 #[derive(Debug, Clone)]
 pub struct Mode<const N: usize> {
-    /// The multiple.
+    /// Eigenvalue.
     pub eigenvalue: f64,
     /// Motion of every node, of norm 1 in the metric.
     pub motion: Vec<NodeVector<N>>,
-    /// The metric's force on it.
+    /// Product of the metric with the motion.
     pub force: Vec<NodeVector<N>>,
 }
 
-/// The lowest modes at a solution, rising; fewer than `count` where there are no more.
+/// The lowest modes at a solution, rising; fewer than `count` where the programme has fewer.
 ///
-/// Subspace iteration with the inverse, shifted below all eigenvalues, so that it converges to the lowest in their order.
+/// By subspace iteration with the inverse of the second variation, shifted below all eigenvalues.
 ///
-/// Errors: [`Singular`] where that cannot be factorised.
+/// Errors: [`Singular`] where the shifted second variation cannot be factorised.
 pub fn lowest_modes<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>(
     program: &P,
     at: &mut Stationary<P::Point>,
@@ -30,15 +30,18 @@ pub fn lowest_modes<P: Program<X, U, N>, const X: usize, const U: usize, const N
     lowest_modes_of(response, &program.scales(), count)
 }
 
-/// The same of a system that has been factorised.
+/// The lowest modes of a factorised system.
 pub(crate) fn lowest_modes_of<const X: usize, const U: usize, const N: usize>(
     mut response: Response<X, U, N>,
     scales: &Scales,
     count: usize,
 ) -> Result<Vec<Mode<N>>, Singular> {
+    /// Count of guard vectors beyond the modes that are sought; a number.
     const GUARDS: usize = 4;
+    /// Largest count of subspace iterations; a number.
     const ITERATIONS: usize = 100;
-    const SETTLED: f64 = 1e-12;
+    /// Relative change of shifted eigenvalues at which the iteration has converged; dimensionless.
+    const CONVERGED: f64 = 1e-12;
     let shift = shift_below_all(&mut response, scales)?;
     let mut subspace = first_guess(&response, count + GUARDS);
     let mut last = vec![f64::INFINITY; count];
@@ -51,7 +54,8 @@ pub(crate) fn lowest_modes_of<const X: usize, const U: usize, const N: usize>(
             .take(count)
             .map(|mode| mode.eigenvalue)
             .collect();
-        let moved = |(now, last): (&f64, &f64)| (now - last).abs() > SETTLED * (now - shift).abs();
+        let moved =
+            |(now, last): (&f64, &f64)| (now - last).abs() > CONVERGED * (now - shift).abs();
         let is_settled = now.len() < last.len() || !now.iter().zip(&last).any(moved);
         if is_settled && now.len() == last.len() {
             break;
@@ -62,7 +66,7 @@ pub(crate) fn lowest_modes_of<const X: usize, const U: usize, const N: usize>(
     Ok(subspace)
 }
 
-/// A point moved so far along a mode.
+/// A point perturbed along a mode by a length.
 pub fn moved<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>(
     program: &P,
     point: &P::Point,
@@ -74,16 +78,17 @@ pub fn moved<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize
     moved
 }
 
-/// Shifts the system to where no eigenvalue is below, and says by how much.
+/// Shifts the system below all eigenvalues; gives the shift.
 fn shift_below_all<const X: usize, const U: usize, const N: usize>(
     response: &mut Response<X, U, N>,
     scales: &Scales,
 ) -> Result<f64, Singular> {
-    /// First shift, in the unit of eigenvalues.
-    const FIRST: f64 = -100.0;
-    const MOST: usize = 20;
-    let (mut shift, mut next) = (0.0, FIRST * scales.eigenvalue());
-    for _ in 0..MOST {
+    /// Shift of the eigenvalues that is tried first; in [`Scales::eigenvalue`].
+    const FIRST_SHIFT: f64 = -100.0;
+    /// Largest count of shifts that are tried; a number.
+    const SHIFTS: usize = 20;
+    let (mut shift, mut next) = (0.0, FIRST_SHIFT * scales.eigenvalue());
+    for _ in 0..SHIFTS {
         let negative = response.shift(next - shift);
         shift = next;
         if negative == Ok(0) {
@@ -94,7 +99,7 @@ fn shift_below_all<const X: usize, const U: usize, const N: usize>(
     Err(Singular)
 }
 
-/// Smooth motions in general position.
+/// First subspace: smooth motions in general position.
 fn first_guess<const X: usize, const U: usize, const N: usize>(
     response: &Response<X, U, N>,
     count: usize,
@@ -122,10 +127,10 @@ fn first_guess<const X: usize, const U: usize, const N: usize>(
     (0..count).map(guess).collect()
 }
 
-/// A motion of every node, several times.
+/// Several motions, each of all nodes.
 type Motions<const N: usize> = Vec<Vec<NodeVector<N>>>;
 
-/// The motions under some forces.
+/// Solutions of the system under forces.
 fn answers<const X: usize, const U: usize, const N: usize>(
     response: &mut Response<X, U, N>,
     forces: &[Vec<NodeVector<N>>],
@@ -140,13 +145,14 @@ fn answers<const X: usize, const U: usize, const N: usize>(
     forces.iter().map(&mut answer).collect()
 }
 
-/// The best approximations of modes within the span of some motions, of which the forces are known under which they arise.
+/// Ritz approximations of modes in the span of motions, each the solution under a known force.
 fn ritz<const X: usize, const U: usize, const N: usize>(
     response: &Response<X, U, N>,
     motions: &[Vec<NodeVector<N>>],
     forces: &[Vec<NodeVector<N>>],
     shift: f64,
 ) -> Vec<Mode<N>> {
+    /// Eigenvalue of the scaled mass matrix below which motions depend on each other; dimensionless.
     const DEPENDENT: f64 = 1e-14;
     let own: Vec<_> = motions
         .iter()
@@ -158,7 +164,7 @@ fn ritz<const X: usize, const U: usize, const N: usize>(
         0.5 * (&product + product.transpose())
     };
     let (stiffness, mass) = (products(forces), products(&own));
-    // First to coordinates in which the mass is 1, without the motions that depend on others.
+    // To coordinates of unit mass first, without dependent motions.
     let scale = DVector::from_fn(count, |i, _| {
         mass[(i, i)].max(f64::MIN_POSITIVE).sqrt().recip()
     });

@@ -1,12 +1,12 @@
-//! Constraints that say the same, or the opposite, whatever the point: rank of their gradients.
+//! Redundant constraints, by the rank of their gradients.
 
 use super::kkt::Kkt;
 use crate::program::{Multipliers, Program};
 use nalgebra::{DMatrix, SymmetricEigen};
 
-/// The rows of equalities whose gradients depend on each other at a point.
+/// Rows of redundant equalities: their gradients are linearly dependent at a point.
 ///
-/// At a point in general position they do so everywhere.
+/// Gradients that are dependent at a point in general position are dependent at every point.
 pub fn redundant_equalities<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>(
     program: &P,
     point: &P::Point,
@@ -19,10 +19,12 @@ pub fn redundant_equalities<P: Program<X, U, N>, const X: usize, const U: usize,
         .map_or_else(Vec::new, |compliance| involved(&compliance))
 }
 
-/// The rows that take part in a combination with no compliance.
+/// The rows in linear combinations of zero compliance.
 fn involved(compliance: &DMatrix<f64>) -> Vec<usize> {
-    const NOTHING: f64 = 1e-13;
-    const PART: f64 = 1e-3;
+    /// Eigenvalue of the scaled compliance below which rows depend on each other; dimensionless.
+    const DEPENDENT: f64 = 1e-13;
+    /// Entry of a unit eigenvector above which a row participates in the dependence; dimensionless.
+    const PARTICIPATION: f64 = 1e-3;
     let rows = 0..compliance.nrows();
     let used: Vec<usize> = rows.filter(|row| compliance[(*row, *row)] > 0.0).collect();
     let scale = |row: usize| 1.0 / compliance[(used[row], used[row])].sqrt();
@@ -35,9 +37,9 @@ fn involved(compliance: &DMatrix<f64>) -> Vec<usize> {
         .eigenvalues
         .iter()
         .zip(eigen.eigenvectors.column_iter());
-    for (_, vector) in combinations.filter(|(value, _)| **value < NOTHING) {
+    for (_, vector) in combinations.filter(|(value, _)| **value < DEPENDENT) {
         let parts = vector.iter().enumerate();
-        let taking_part = parts.filter(|(_, part)| part.abs() > PART);
+        let taking_part = parts.filter(|(_, part)| part.abs() > PARTICIPATION);
         involved.extend(taking_part.map(|(row, _)| used[row]));
     }
     involved.sort_unstable();

@@ -1,21 +1,22 @@
-//! How a stationary point answers to small changes of its programme: the first-order conditions, factorised there.
+//! Response of a stationary point to a perturbation of its programme, by the factorised first-order conditions.
 
 use super::TooConcave;
 use super::chain::NodeVector;
 use super::kkt::Kkt;
 use crate::layout::Layout;
-use crate::program::{Linearisation, Program, Stationary, Values};
+use crate::linearisation::Linearisation;
+use crate::program::{Program, Stationary, Values};
 use crate::{Residuals, larger, largest, largest_entry};
 use nalgebra::SMatrix;
 
-/// Most times that the solution of the system is improved by what it misses.
+/// Largest count of refinements of a solution; a number.
 const REFINEMENTS: usize = 20;
-/// Share of the solution below which an improvement is not worth it.
-const ENOUGH: f64 = 1e-16;
-/// Share of the right-hand side below which the answer to it is rounding.
-const NOTHING: f64 = 1e-8;
-/// Share of the solution above which a miss is more than rounding.
-const CLEARLY: f64 = 1e-6;
+/// Ratio of refinement to solution at which refinement has converged; dimensionless.
+const CONVERGED: f64 = 1e-16;
+/// Ratio of solution to right-hand side below which the solution is rounding; dimensionless.
+const NEGLIGIBLE: f64 = 1e-8;
+/// Ratio of residual to solution above which the system is singular; dimensionless.
+const SIGNIFICANT: f64 = 1e-6;
 
 /// The symmetric system
 ///
@@ -26,9 +27,9 @@ const CLEARLY: f64 = 1e-6;
 /// ```
 ///
 /// at a solution: H the second derivative of the Lagrangian, J and S the gradients of equalities and slacks s, whose
-/// multipliers are ν. With the change of these and of the Lagrangian's gradient on the right, it yields the step of the
-/// unknowns, that of the equalities' multipliers, and that of the inequalities' with the sign changed, along which slack
-/// times multiplier stays the same.
+/// multipliers are ν. The right-hand side is the perturbation of the Lagrangian's gradient, of the equalities and of
+/// the slacks. The solution is the step of the unknowns, the step of the equalities' multipliers, and minus the step of the
+/// inequalities' multipliers, along which slack times multiplier is constant.
 #[derive(Debug, Clone)]
 pub struct Response<const X: usize, const U: usize, const N: usize> {
     kkt: Kkt<X, U, N>,
@@ -37,11 +38,11 @@ pub struct Response<const X: usize, const U: usize, const N: usize> {
     negative: usize,
 }
 
-/// A vector of the system: its right-hand side, or its solution.
+/// A right-hand side or a solution of the system.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Direction<const N: usize> {
-    /// Entries of the unknowns; of a right-hand side they are derivatives by all states and controls, of a solution the
-    /// states are carried along.
+    /// Entries of the nodes: in a right-hand side, derivatives by all states and controls; in a solution, changes of all
+    /// states and controls.
     pub nodes: Vec<NodeVector<N>>,
     /// Entries of the equalities.
     pub equalities: Vec<f64>,
@@ -49,7 +50,7 @@ pub struct Direction<const N: usize> {
     pub inequalities: Vec<f64>,
 }
 
-/// The system has no solution, or not a single one.
+/// The system has no unique solution.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Singular;
 
@@ -67,9 +68,9 @@ impl<const X: usize, const U: usize, const N: usize> Response<X, U, N> {
         Ok(response)
     }
 
-    /// The same at any stationary point, minimum or not.
+    /// Factorises the system of a programme at a stationary point of any inertia.
     ///
-    /// Errors: [`Singular`] where the second variation vanishes in some direction.
+    /// Errors: [`Singular`] where the second variation has a zero eigenvalue.
     pub fn of_stationary<P: Program<X, U, N>>(
         program: &P,
         at: &mut Stationary<P::Point>,
@@ -118,8 +119,8 @@ impl<const X: usize, const U: usize, const N: usize> Response<X, U, N> {
         self.kkt.layout()
     }
 
-    /// What the first-order conditions miss where the system was factorised, with slacks times multipliers to become
-    /// `barrier` times their weight: minus the right-hand side of Newton's step.
+    /// Residual of the first-order conditions of the barrier problem at the point of the factorisation: the right-hand side
+    /// of Newton's step.
     pub(crate) fn conditions(&self, multipliers: &[f64], barrier: f64) -> Direction<N> {
         let mut missed = self.zero();
         missed.nodes.copy_from_slice(&self.linear().gradient);
@@ -136,8 +137,8 @@ impl<const X: usize, const U: usize, const N: usize> Response<X, U, N> {
         missed
     }
 
-    /// What the first-order conditions of a programme miss at a point where slacks may be a little below zero, slacks for
-    /// themselves; `None` where they cannot be told.
+    /// Residual of the first-order conditions of a programme at a point whose slacks may be slightly negative; `None` where
+    /// the conditions cannot be evaluated.
     pub(crate) fn conditions_of<P: Program<X, U, N>>(
         program: &P,
         at: &Stationary<P::Point>,
@@ -154,13 +155,13 @@ impl<const X: usize, const U: usize, const N: usize> Response<X, U, N> {
         conditions.nodes.iter().all(is_finite).then_some(conditions)
     }
 
-    /// Moves the entries of controls that follow others to these, and drops those that are held.
+    /// Turns a right-hand side by all states and controls into a right-hand side by the unknowns.
     pub(crate) fn fold(&self, vector: &mut Direction<N>) {
         self.linear().chain.carry_back(&mut vector.nodes);
         self.linear().chain.fold(&mut vector.nodes);
     }
 
-    /// Residuals of what the conditions miss.
+    /// Max-norms of a residual.
     pub(crate) fn residuals(&self, missed: &Direction<N>, multipliers: &[f64]) -> Residuals {
         let products = multipliers.iter().zip(&self.values.slacks);
         Residuals {
@@ -172,14 +173,15 @@ impl<const X: usize, const U: usize, const N: usize> Response<X, U, N> {
         }
     }
 
-    /// Whether every slack times its multiplier is `barrier` times its weight, to the order.
+    /// Whether every slack times its multiplier is near `barrier` times its weight.
     pub(crate) fn is_centred(&self, multipliers: &[f64], barrier: f64) -> bool {
-        const LITTLE: f64 = 1e-3;
+        /// Relative distance of slack times multiplier from the central path that counts as centred; dimensionless.
+        const CENTRED: f64 = 1e-3;
         let weights = self.layout().row_weights();
         let rows = multipliers.iter().zip(&self.values.slacks).zip(weights);
         let mut shares =
             rows.map(|((multiplier, slack), weight)| multiplier * slack / (barrier * weight));
-        shares.all(|share| (share - 1.0).abs() <= LITTLE)
+        shares.all(|share| (share - 1.0).abs() <= CENTRED)
     }
 
     /// Change of every slack along a motion, to first order.
@@ -194,7 +196,7 @@ impl<const X: usize, const U: usize, const N: usize> Response<X, U, N> {
         &self.values
     }
 
-    /// Number of directions, of those that the equalities leave, in which the second variation is negative.
+    /// Number of negative eigenvalues of the second variation on the tangent space of the equalities.
     pub(crate) fn negative(&self) -> usize {
         self.negative
     }
@@ -205,10 +207,10 @@ impl<const X: usize, const U: usize, const N: usize> Response<X, U, N> {
         Ok(())
     }
 
-    /// Takes a multiple of the metric off the second derivatives and factorises the system again; gives the number of
-    /// directions, of those that the equalities leave, in which it is negative then.
+    /// Subtracts a multiple of the metric from the second derivatives and factorises the system again; gives the number of
+    /// negative eigenvalues on the tangent space of the equalities.
     ///
-    /// Errors: [`Singular`] where it vanishes in some direction.
+    /// Errors: [`Singular`] where the shifted second variation has a zero eigenvalue.
     pub(crate) fn shift(&mut self, by: f64) -> Result<usize, Singular> {
         self.kkt.linear.diagonal.shift(&self.metric, by);
         self.kkt.shift(&self.metric, by);
@@ -228,50 +230,45 @@ impl<const X: usize, const U: usize, const N: usize> Response<X, U, N> {
         self.metric.iter().zip(motion).map(force).collect()
     }
 
-    /// The same, with the squares of the slacks' changes in it.
-    ///
-    /// Motions that hardly change any state may still change slacks.
+    /// Force of the metric with the squares of the slack rates added: a motion of small states may have large slack rates.
     pub(crate) fn force_with_slacks(&self, motion: &[NodeVector<N>]) -> Vec<NodeVector<N>> {
-        const SHARE: f64 = 0.1;
+        /// Weight of the squares of slack rates beside the metric; squared distance per unit weight and squared slack.
+        const SLACK_SHARE: f64 = 0.1;
         let mut force = self.force(motion);
         let rates = self.slack_rates(motion);
         let weights = self.layout().row_weights();
         self.linear()
-            .add_slack_gradients(|row| SHARE * weights[row] * rates[row], &mut force);
+            .add_slack_gradients(|row| SLACK_SHARE * weights[row] * rates[row], &mut force);
         force
     }
 
     /// A vector of zeros.
     pub fn zero(&self) -> Direction<N> {
-        Direction {
-            nodes: vec![NodeVector::zeros(); self.layout().nodes()],
-            equalities: vec![0.0; self.layout().equalities()],
-            inequalities: vec![0.0; self.layout().inequalities()],
-        }
+        Direction::zeros(self.layout())
     }
 
     /// Solves the system.
     ///
-    /// The inequalities are eliminated for the factorisation, and where one is active that drowns its multiplier in
-    /// rounding. What is missed is counted with the multipliers themselves, so that it does not come back.
+    /// Elimination of an active inequality loses its multiplier in rounding. The residual is computed with the multipliers
+    /// themselves, so that refinement restores the multiplier.
     ///
-    /// Errors: [`Singular`] where the equalities cannot change as asked.
+    /// Errors: [`Singular`] where no step changes the equalities by their right-hand side.
     pub fn solve(&mut self, right: &Direction<N>) -> Result<Direction<N>, Singular> {
         let (found, last, missed) = self.improve(right);
-        let size = largest_entry(&found.nodes).max(NOTHING * largest_entry(&right.nodes));
+        let size = largest_entry(&found.nodes).max(NEGLIGIBLE * largest_entry(&right.nodes));
         let moved = size
             .max(largest(right.equalities.iter()))
             .max(f64::MIN_POSITIVE);
-        let is_met = largest(missed.equalities.iter()) <= CLEARLY * moved;
-        match last <= CLEARLY && is_met {
+        let is_met = largest(missed.equalities.iter()) <= SIGNIFICANT * moved;
+        match last <= SIGNIFICANT && is_met {
             true => Ok(found),
             false => Err(Singular),
         }
     }
 
-    /// Solves the system as well as can be, however near to singular it is: for what is improved on later.
+    /// Solves a system that may be nearly singular, for an approximation that a later iteration corrects.
     ///
-    /// Errors: [`Singular`] where nothing finite comes out.
+    /// Errors: [`Singular`] where the solution is not finite.
     pub(crate) fn solve_nearly(&mut self, right: &Direction<N>) -> Result<Direction<N>, Singular> {
         let (found, ..) = self.improve(right);
         let is_finite =
@@ -279,35 +276,39 @@ impl<const X: usize, const U: usize, const N: usize> Response<X, U, N> {
         is_finite.then_some(found).ok_or(Singular)
     }
 
-    /// The solution, improved until that is not worth while; the share of the last improvement, and what is still missed.
+    /// The solution by iterative refinement, the ratio of the last refinement to the solution, and the last residual.
     fn improve(&mut self, right: &Direction<N>) -> (Direction<N>, f64, Direction<N>) {
         let mut found = self.zero();
+        let first_pair_row = self.layout().first_pair_row();
         let stiffness = self.kkt.stiffness.iter().zip(&right.inequalities);
-        for (found, (stiffness, right)) in found.inequalities.iter_mut().zip(stiffness) {
+        let rows = found.inequalities[..first_pair_row].iter_mut();
+        for (found, (stiffness, right)) in rows.zip(stiffness) {
             *found = stiffness * right;
         }
         let mut missed = self.missed(right, &found);
         let mut last = f64::INFINITY;
         let least = largest_entry(&right.nodes).max(largest(right.equalities.iter()));
-        let least = NOTHING * least;
+        let least = NEGLIGIBLE * least;
         let size = |vectors: &[_]| largest_entry(vectors).max(least).max(f64::MIN_POSITIVE);
         for _ in 0..=REFINEMENTS {
+            let of_pairs = &missed.inequalities[first_pair_row..];
+            self.kkt.pair_targets.copy_from_slice(of_pairs);
             self.kkt.find_step(&missed.nodes, &missed.equalities);
             self.add_step(&mut found);
             missed = self.missed(right, &found);
             let share = largest_entry(&self.kkt.step) / size(&found.nodes);
             let no_better = share >= last;
-            // Every improvement is by about the same factor.
+            // Refinement converges linearly: the ratio of the next refinement is known.
             let next = share * share / last.min(1.0);
             last = share;
-            if next <= ENOUGH || no_better {
+            if next <= CONVERGED || no_better {
                 break;
             }
         }
         (found, last, missed)
     }
 
-    /// Adds the step that was solved for last.
+    /// Adds the last refinement to a solution.
     fn add_step(&self, to: &mut Direction<N>) {
         for (node, step) in to.nodes.iter_mut().zip(&self.kkt.step) {
             *node += step;
@@ -317,12 +318,18 @@ impl<const X: usize, const U: usize, const N: usize> Response<X, U, N> {
         }
         let rates = self.slack_rates(&self.kkt.step);
         let rows = rates.iter().zip(&self.kkt.stiffness);
-        for (row, (rate, stiffness)) in to.inequalities.iter_mut().zip(rows) {
+        let (others, pairs) = to.inequalities.split_at_mut(self.layout().first_pair_row());
+        for (row, (rate, stiffness)) in others.iter_mut().zip(rows) {
             *row += stiffness * rate;
+        }
+        // These multipliers are unknowns of the border: no difference of states loses them in rounding.
+        for (row, force) in pairs.iter_mut().zip(self.kkt.pair_forces()) {
+            *row += force;
         }
     }
 
-    /// Left-hand side of the first two rows plus the right-hand side: nothing at the solution.
+    /// Residual of the system, left-hand side plus right-hand side: of stationarity, of the equalities and of the
+    /// inequalities between pairs. The other inequalities are eliminated, and their rows hold exactly.
     fn missed(&self, right: &Direction<N>, at: &Direction<N>) -> Direction<N> {
         let linear = self.linear();
         let mut missed = right.clone();
@@ -337,12 +344,33 @@ impl<const X: usize, const U: usize, const N: usize> Response<X, U, N> {
         for (missed, rate) in missed.equalities.iter_mut().zip(rates) {
             *missed += rate;
         }
+        let first = self.layout().first_pair_row();
+        if first < missed.inequalities.len() {
+            let rates = self.slack_rates(&at.nodes);
+            let rows = missed.inequalities.iter_mut().zip(&at.inequalities);
+            let rows = rows.zip(rates).zip(&self.kkt.stiffness).skip(first);
+            for (((missed, multiplier), rate), stiffness) in rows {
+                *missed = match *stiffness {
+                    0.0 => 0.0,
+                    stiffness => *missed + rate - multiplier / stiffness,
+                };
+            }
+        }
         missed
     }
 }
 
 impl<const N: usize> Direction<N> {
-    /// Adds a multiple of another.
+    /// A vector of zeros.
+    pub fn zeros(layout: &Layout) -> Self {
+        Self {
+            nodes: vec![NodeVector::zeros(); layout.nodes()],
+            equalities: vec![0.0; layout.equalities()],
+            inequalities: vec![0.0; layout.inequalities()],
+        }
+    }
+
+    /// Adds a multiple of another direction.
     pub fn add(&mut self, factor: f64, other: &Self) {
         for (own, other) in self.nodes.iter_mut().zip(&other.nodes) {
             *own += factor * other;
@@ -354,8 +382,8 @@ impl<const N: usize> Direction<N> {
         }
     }
 
-    /// Multiplies it by a factor.
-    pub fn scale(&mut self, factor: f64) {
+    /// Multiplies all entries by a factor.
+    pub(crate) fn scale(&mut self, factor: f64) {
         self.nodes.iter_mut().for_each(|node| *node *= factor);
         let rows = self.equalities.iter_mut().chain(&mut self.inequalities);
         rows.for_each(|row| *row *= factor);

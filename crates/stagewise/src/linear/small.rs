@@ -3,16 +3,16 @@
 use super::TooConcave;
 use nalgebra::{DMatrix, SMatrix, SVector, SymmetricEigen};
 
-/// Inverse of a symmetric matrix with at most so many negative eigenvalues, and their number.
+/// Inverse of a symmetric matrix with at most `most` negative eigenvalues, and their number.
 ///
-/// Errors: [`TooConcave`] where there are more, or the matrix is singular.
+/// Errors: [`TooConcave`] where more eigenvalues are negative, or the matrix is singular.
 #[inline(always)]
 pub(super) fn invert<const U: usize>(
     matrix: &[[f64; U]; U],
     most: usize,
 ) -> Result<([[f64; U]; U], usize), TooConcave> {
     match U {
-        // Most chains have two controls a node: nothing beats the closed form.
+        // The closed form is the fastest, and two controls a node are the most frequent case.
         2 => {
             let ([a, b, d], negative) =
                 invert_two([matrix[0][0], matrix[0][1], matrix[1][1]], most)?;
@@ -25,7 +25,7 @@ pub(super) fn invert<const U: usize>(
     }
 }
 
-/// The same of a 2×2 matrix, by its entries (0, 0), (0, 1) and (1, 1).
+/// Inverse of a 2×2 matrix and its number of negative eigenvalues, by the entries (0, 0), (0, 1) and (1, 1).
 #[inline(always)]
 fn invert_two([a, b, d]: [f64; 3], most: usize) -> Result<([f64; 3], usize), TooConcave> {
     let determinant = a * d - b * b;
@@ -58,11 +58,11 @@ fn invert_any<const U: usize>(
     Ok((inverse.data.0, negative))
 }
 
-/// Inverse of a symmetric matrix by its eigenvectors, with at most so many negative eigenvalues, and their number.
+/// Inverse of a symmetric matrix by its eigenvectors, with at most `most` negative eigenvalues, and their number.
 ///
-/// Each unknown is measured in a unit of its own: that of a stiff one is not that of a slack one.
+/// Unknowns are scaled by their stiffness first, as stiffnesses may differ by many orders of magnitude.
 ///
-/// Errors: [`TooConcave`] where there are more, or the matrix is singular.
+/// Errors: [`TooConcave`] where more eigenvalues are negative, or the matrix is singular.
 pub(super) fn invert_indefinite<const N: usize>(
     matrix: &SMatrix<f64, N, N>,
     most: usize,

@@ -1,8 +1,8 @@
 //! Pseudo-arclength continuation: the curve of stationary points, minima or not, of a family of programmes.
 //!
-//! Every step goes along the tangent and is corrected by Newton's method square to it, so that the curve may turn back in the
-//! parameter. Where the inertia of the second variation changes, the place is found: a fold, where the parameter turns back,
-//! or a bifurcation, where another curve crosses.
+//! Every step goes along the tangent and is corrected by Newton's method orthogonal to the tangent, so that the curve may
+//! turn back in the parameter. Where the inertia of the second variation changes, the event is located: a fold, where the
+//! parameter turns back, or a bifurcation, where another curve crosses.
 //!
 //! Source of the method: H. B. Keller, "Numerical solution of bifurcation and nonlinear eigenvalue problems" (1977).
 
@@ -18,7 +18,7 @@ use std::ops::ControlFlow;
 pub struct Continuation<'a, F, const X: usize, const U: usize, const N: usize> {
     pub(super) family: &'a F,
     pub(super) tolerance: f64,
-    /// Product of slack and multiplier that is allowed, in multiples of the tolerance.
+    /// Softness of the inequalities: ratio of slack times multiplier to the tolerance.
     pub(super) softness: f64,
     pub(super) range: [f64; 2],
     pub(super) pace: Pace,
@@ -26,7 +26,7 @@ pub struct Continuation<'a, F, const X: usize, const U: usize, const N: usize> {
     pub(super) unit: f64,
 }
 
-/// Shortest step, in the unit of distance.
+/// Length of the shortest step along a curve; in [`Scales::distance`](crate::Scales::distance).
 const SHORTEST: f64 = 1e-7;
 
 /// A step of a continuation.
@@ -39,7 +39,7 @@ pub(super) struct Step<P, const N: usize> {
 impl<'a, F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
     Continuation<'a, F, X, U, N>
 {
-    /// Over a range of the parameter.
+    /// A continuation over a range of the parameter.
     pub fn new(family: &'a F, tolerance: f64, range: [f64; 2], pace: Pace) -> Self {
         Self {
             family,
@@ -56,7 +56,7 @@ impl<'a, F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
         SHORTEST * self.unit
     }
 
-    /// The station at a solution of the programme at a parameter, heading for larger ones, or for smaller.
+    /// The station at a solution of the programme at a parameter, with a tangent toward larger parameters, or smaller ones.
     pub fn start(
         &self,
         at: &Stationary<F::Point>,
@@ -72,8 +72,8 @@ impl<'a, F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
         Some(station)
     }
 
-    /// Follows the curve from a station to the end of the range or of the budget. `proceed` is asked once a step whether to
-    /// go on, and may end the curve for a reason of its own.
+    /// Follows the curve from a station to the end of the range or of the budget. `proceed` is called
+    /// once a step, and ends the curve for a reason of the caller's by `Break`.
     pub fn trace<R>(
         &self,
         start: Station<F::Point, N>,
@@ -118,7 +118,7 @@ impl<'a, F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
         curve
     }
 
-    /// The station of the curve that is followed, at a place a little before an event or beyond it.
+    /// The station of the curve at a parameter offset from an event.
     pub fn beside(&self, event: &Event<F::Point, N>, by: f64) -> Option<Station<F::Point, N>> {
         let mut at = event.station.at.clone();
         let arrival = self.correct(&mut at, event.parameter + by, None)?;
@@ -132,13 +132,14 @@ impl<'a, F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
         let mut response = Response::of_stationary(&program, &mut at).ok()?;
         let mut load = response.zero();
         load.nodes = event.mode.force.iter().map(|force| -force).collect();
-        // Next to the event hardly anything resists along the mode: the answer is a large multiple of it.
+        // Next to the event the stiffness along the mode is small: the response is a large multiple of the mode.
         let answer = response.solve_nearly(&load).ok()?;
         let multiple = dot(&event.mode.force, &answer.nodes);
         Some(answer.equalities.iter().map(|row| row / multiple).collect())
     }
 
-    /// The minimum downhill from a station, at another value of the parameter; where it is a saddle, off along a mode.
+    /// The minimum downhill from a station, at another value of the parameter; from a saddle, after a perturbation along a
+    /// mode.
     pub fn descend(
         &self,
         from: &Station<F::Point, N>,
@@ -146,19 +147,20 @@ impl<'a, F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
         parameter: f64,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Option<Solution<F::Point>> {
-        /// First barrier.
-        const NEAR: f64 = 1e-5;
+        /// Barrier parameter with which a descent begins, low enough to stay near the start; objective per unit weight.
+        const FIRST_BARRIER: f64 = 1e-5;
+        /// Largest count of interior-point iterations of a descent; a number.
         const ITERATIONS: usize = 300;
-        /// Length of the step off a saddle, in the unit of distance.
-        const OFF: f64 = 1e-3;
+        /// Perturbation off a saddle along a mode; in [`Scales::distance`](crate::Scales::distance).
+        const PERTURBATION: f64 = 1e-3;
         let settings = Settings {
             tolerance: self.tolerance,
             iterations: ITERATIONS,
-            barrier: NEAR,
+            barrier: FIRST_BARRIER,
         };
         let program = self.family.at(parameter)?;
         let mut found = minimise(&program, &settings, from.at.point.clone(), proceed);
-        for off in [OFF, -OFF, 10.0 * OFF] {
+        for off in [PERTURBATION, -PERTURBATION, 10.0 * PERTURBATION] {
             if found.is_minimum() {
                 break;
             }
@@ -175,14 +177,15 @@ impl<'a, F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
         lowest_modes_of(response, &program.scales(), count).ok()
     }
 
-    /// The next station, and what lies between; the length of the step is adapted.
+    /// The next station, and the event between the two stations; adapts the length of the step.
     pub(super) fn advance(
         &self,
         last: &Station<F::Point, N>,
         length: &mut f64,
     ) -> Option<Step<F::Point, N>> {
+        /// Ratio of successive step lengths where a step was accepted; dimensionless.
         const LONGER: f64 = 1.5;
-        /// Cosine of the sharpest turn within a step.
+        /// Cosine of the sharpest turn of the tangent within a step; dimensionless.
         const SHARPEST: f64 = 0.9;
         loop {
             let step = self.step(last, &last.tangent, *length);
@@ -225,7 +228,7 @@ impl<'a, F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
         }
     }
 
-    /// The station between two where the parameter has a value.
+    /// The station at a parameter between two stations.
     fn land(
         &self,
         from: &Station<F::Point, N>,
@@ -233,7 +236,7 @@ impl<'a, F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
         parameter: f64,
     ) -> Option<Station<F::Point, N>> {
         let share = (parameter - from.parameter) / (to.parameter - from.parameter);
-        // A curve that begins there goes on to another such station.
+        // A curve that begins at the parameter ends at a second station of the same parameter.
         let begins_there = from.parameter == parameter;
         let nearer = if share < 0.5 && !begins_there {
             from
@@ -245,7 +248,7 @@ impl<'a, F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
         self.station(at, arrival, Some(&to.tangent))
     }
 
-    /// Half of the complementarity that is allowed, as a barrier parameter.
+    /// Barrier parameter at half of the tolerated complementarity.
     pub(super) fn barrier(&self, program: &F::Program) -> f64 {
         let layout = program.layout();
         let weights = layout.stage_weights().iter().chain(layout.row_weights());
@@ -253,22 +256,25 @@ impl<'a, F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
         0.5 * self.softness * self.tolerance / heaviest
     }
 
-    /// Whether the last of the stations is where the first was, some way on.
+    /// Whether the last station coincides with the first, so that the curve is closed.
     fn is_closed(&self, stations: &[Station<F::Point, N>]) -> bool {
-        const SOME_WAY: usize = 10;
+        /// Count of stations of the shortest closed curve; a number.
+        const SHORTEST_LOOP: usize = 10;
+        /// Distance in the parameter, in [`Scales::distance`](crate::Scales::distance), and relative distance in the
+        /// objective, dimensionless, of stations that coincide.
         const SAME: f64 = 1e-6;
         let [first, .., last] = stations else {
             return false;
         };
         let objective = (first.objective - last.objective).abs();
         let parameter = (first.parameter - last.parameter).abs();
-        stations.len() > SOME_WAY
+        stations.len() > SHORTEST_LOOP
             && parameter <= SAME * self.unit
             && objective <= SAME * first.objective.abs()
     }
 }
 
-/// The stationary point, minimum or not, that Newton's method finds next to a point.
+/// The stationary point, minimum or not, to which Newton's method converges from a point.
 pub fn settle<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>(
     program: &P,
     tolerance: f64,

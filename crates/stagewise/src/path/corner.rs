@@ -1,4 +1,4 @@
-//! Active-set corners of a curve, where an inequality becomes active or inactive at once.
+//! Active-set corners of a curve, where an inequality becomes active or inactive.
 
 use super::continuation::{Continuation, Step};
 use super::curve::{Event, Events, Pace, Station, Turn};
@@ -10,14 +10,17 @@ impl<F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
 {
     /// The station beyond an active-set corner, where no step along the curve leads on.
     ///
-    /// With softer inequalities the curve is round there: it is followed until it is near enough to the sharp one again.
+    /// With softened inequalities the curve is smooth at the corner. The softened curve is followed until it is near the
+    /// original curve again.
     pub(super) fn round_corner(
         &self,
         last: &Station<F::Point, N>,
         length: &mut f64,
     ) -> Option<Step<F::Point, N>> {
+        /// Ratios of softened to given complementarity that are tried in turn; dimensionless.
         const SOFTER: [f64; 4] = [1e1, 1e2, 1e3, 1e4];
-        /// How far before the corner the soft curve is taken up, as it cuts the corner, in the unit of distance.
+        /// Distances before the corner at which the softened curve begins, as it cuts the corner; in
+        /// [`Scales::distance`](crate::Scales::distance).
         const BACK: [f64; 2] = [3e-3, 1e-2];
         let mut ways = SOFTER
             .into_iter()
@@ -36,24 +39,25 @@ impl<F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
         })
     }
 
-    /// The first station beyond a corner to which the curve with softer inequalities leads.
+    /// The first station beyond a corner that the softened curve reaches.
     fn beyond_corner(
         &self,
         last: &Station<F::Point, N>,
         softness: f64,
         back: f64,
     ) -> Option<Station<F::Point, N>> {
-        /// First step along the soft curve, in the unit of distance.
-        const FIRST: f64 = 1e-4;
-        const MOST: usize = 100;
+        /// Length of the first step along the softened curve; in [`Scales::distance`](crate::Scales::distance).
+        const FIRST_STEP: f64 = 1e-4;
+        /// Largest count of steps along the softened curve; a number.
+        const STEPS: usize = 100;
         let soft = self.softened(softness);
         let [low, high] = self.range;
         let before = self
             .step(last, &last.tangent, -back)
             .filter(|before| (low..=high).contains(&before.parameter))?;
         let mut station = soft.step(&before, &before.tangent, 0.0)?;
-        let mut length = FIRST * self.unit;
-        for _ in 0..MOST {
+        let mut length = FIRST_STEP * self.unit;
+        for _ in 0..STEPS {
             let step = soft.advance(&station, &mut length)?;
             station = step.station;
             let sharp = self.sharpened(&station, softness, step.arrived);
@@ -68,13 +72,15 @@ impl<F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
         None
     }
 
-    /// The station with the inequalities as they are, next to one with softer ones: square to the curve, or at its parameter.
+    /// The station of the original curve next to a station of the softened curve: orthogonal to the tangent, or at the same
+    /// parameter.
     fn sharpened(
         &self,
         from: &Station<F::Point, N>,
         softness: f64,
         at_parameter: bool,
     ) -> Option<Station<F::Point, N>> {
+        /// Ratio of successive softnesses on the way back to the given inequalities; dimensionless.
         const SHARPER: f64 = 0.1;
         let mut station = from.clone();
         let mut softness = softness;
@@ -89,15 +95,16 @@ impl<F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
         Some(station)
     }
 
-    /// Whether the curve leads on from a station, and away from another.
+    /// Whether a step along the curve from a station increases the distance to another station.
     fn leads_away(&self, from: &Station<F::Point, N>, other: &Station<F::Point, N>) -> bool {
-        const SHORT: f64 = 0.1;
+        /// Length of the probing step, as a share of the distance to the other station; dimensionless.
+        const PROBE: f64 = 0.1;
         let way = from.at.point.distance(&other.at.point);
-        let next = self.step(from, &from.tangent, (SHORT * way).max(self.shortest()));
+        let next = self.step(from, &from.tangent, (PROBE * way).max(self.shortest()));
         next.is_some_and(|next| next.at.point.distance(&other.at.point) > way)
     }
 
-    /// What happens at a corner.
+    /// The event at a corner.
     fn event_at_corner(
         &self,
         before: &Station<F::Point, N>,
@@ -121,7 +128,7 @@ impl<F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
         })
     }
 
-    /// The same with softer inequalities, and no eye for events.
+    /// A continuation with softened inequalities that ignores events.
     fn softened(&self, softness: f64) -> Self {
         Self {
             family: self.family,

@@ -1,4 +1,4 @@
-//! The corrector: Newton's method from near a curve onto it.
+//! The corrector: Newton's method onto a curve of stationary points.
 
 use super::continuation::Continuation;
 use super::curve::{Station, Tangent};
@@ -9,8 +9,9 @@ use crate::linear::modes::dot;
 use crate::linear::{Direction, Response};
 use crate::program::{Program, Stationary};
 
-/// Where Newton's method has converged, factorised there.
-pub(super) struct Arrival<const X: usize, const U: usize, const N: usize> {
+/// The programme and the system at a point where Newton's method has converged.
+pub(super) struct Arrival<P, const X: usize, const U: usize, const N: usize> {
+    program: P,
     response: Response<X, U, N>,
     parameter: f64,
     residuals: Residuals,
@@ -19,7 +20,7 @@ pub(super) struct Arrival<const X: usize, const U: usize, const N: usize> {
 impl<F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
     Continuation<'_, F, X, U, N>
 {
-    /// The station so far along a direction from another.
+    /// The station at a length along a direction from another station.
     pub(super) fn step(
         &self,
         from: &Station<F::Point, N>,
@@ -31,22 +32,23 @@ impl<F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
         self.station(at, arrival, Some(along))
     }
 
-    /// Newton's method at a fixed parameter or, with a direction given, so far along that and at most so far aside, lest it end
-    /// on another curve.
+    /// Newton's method at a fixed parameter, or at a fixed length along a direction. The lateral distance is bounded: beyond
+    /// the bound, another curve may be nearer.
     pub(super) fn correct(
         &self,
         at: &mut Stationary<F::Point>,
         mut parameter: f64,
         along: Option<(&Tangent<N>, f64)>,
-    ) -> Option<Arrival<X, U, N>> {
-        const MOST: usize = 20;
-        /// Length below which a step aside is rounding, in the unit of distance.
+    ) -> Option<Arrival<F::Program, X, U, N>> {
+        /// Largest count of Newton steps of one correction; a number.
+        const CORRECTIONS: usize = 20;
+        /// Length of a lateral step that is rounding; in [`Scales::distance`](crate::Scales::distance).
         const ROUNDING: f64 = 1e-6;
-        /// How far aside a step of no length may lead, as it softens the inequalities, in the unit of distance.
+        /// Lateral distance that a change of softness may lead to; in [`Scales::distance`](crate::Scales::distance).
         const BY_SOFTNESS: f64 = 0.02;
         let mut left = along.map_or(0.0, |(_, length)| length);
         let mut aside = 0.0;
-        for _ in 0..MOST {
+        for _ in 0..CORRECTIONS {
             let program = self.family.at(parameter)?;
             let mut response = Response::of_stationary(&program, at).ok()?;
             let barrier = self.barrier(&program);
@@ -57,6 +59,7 @@ impl<F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
                 && response.is_centred(multipliers, barrier);
             if is_met && left == 0.0 {
                 return Some(Arrival {
+                    program,
                     response,
                     parameter,
                     residuals,
@@ -66,7 +69,9 @@ impl<F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
             let mut moved = 0.0;
             let mut drift = None;
             if let Some((along, length)) = along {
-                let by_parameter = self.family.conditions_by_parameter(at, parameter)?;
+                let by_parameter = self
+                    .family
+                    .conditions_by_parameter(&program, at, parameter)?;
                 let answer = response.solve_nearly(&by_parameter).ok()?;
                 moved = (left - dot(&along.force, &step.nodes))
                     / (along.parameter + dot(&along.force, &answer.nodes));
@@ -100,15 +105,17 @@ impl<F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
         None
     }
 
-    /// The station where Newton's method has arrived.
+    /// The station at a point where Newton's method has converged.
     pub(super) fn station(
         &self,
         at: Stationary<F::Point>,
-        mut arrival: Arrival<X, U, N>,
+        mut arrival: Arrival<F::Program, X, U, N>,
         before: Option<&Tangent<N>>,
     ) -> Option<Station<F::Point, N>> {
         let parameter = arrival.parameter;
-        let by_parameter = self.family.conditions_by_parameter(&at, parameter)?;
+        let by_parameter = self
+            .family
+            .conditions_by_parameter(&arrival.program, &at, parameter)?;
         let negative = arrival.response.negative();
         let motion = arrival.response.solve_nearly(&by_parameter).ok()?;
         let mut tangent = Tangent {
@@ -131,8 +138,8 @@ impl<F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
     }
 }
 
-/// Moves a point and its multipliers along a step, as far as slacks and multipliers stay positive, and gives the share of it
-/// that was taken. The rates are the slacks' changes along the whole step.
+/// Moves a point and its multipliers along the share of a step that keeps slacks and multipliers positive; gives the share.
+/// The rates are the slacks' changes along the whole step.
 fn move_along<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>(
     program: &P,
     response: &Response<X, U, N>,
@@ -140,7 +147,7 @@ fn move_along<P: Program<X, U, N>, const X: usize, const U: usize, const N: usiz
     step: &Direction<N>,
     rates: &[f64],
 ) -> f64 {
-    /// Share of a slack or a multiplier that a step may take off.
+    /// Share of a slack or a multiplier that one step may take off; dimensionless.
     const KEEP: f64 = 0.995;
     let slacks = &response.values().slacks;
     let mut primal = 1.0;
@@ -157,7 +164,7 @@ fn move_along<P: Program<X, U, N>, const X: usize, const U: usize, const N: usiz
     }
     for (row, multiplier) in at.multipliers.inequalities.iter_mut().enumerate() {
         let next = *multiplier - primal * step.inequalities[row];
-        // The multiplier of an inequality that becomes inactive falls as its slack grows, and holds up no other.
+        // The multiplier of an inequality that becomes inactive falls as its slack grows, and does not shorten the step.
         let let_go = *multiplier * slacks[row] / (slacks[row] + primal * rates[row]);
         let goes_on = next > (1.0 - KEEP) * *multiplier;
         *multiplier = if goes_on { next } else { let_go };

@@ -9,17 +9,17 @@ use crate::program::Stationary;
 /// A stationary point on a curve.
 #[derive(Debug, Clone)]
 pub struct Station<P, const N: usize> {
-    /// Parameter of its programme.
+    /// Parameter of the programme.
     pub parameter: f64,
     /// The point.
     pub at: Stationary<P>,
-    /// Objective there.
+    /// Objective at the point.
     pub objective: f64,
-    /// Residuals there.
+    /// Residuals at the point.
     pub residuals: Residuals,
     /// Number of negative eigenvalues of the second variation.
     pub negative: usize,
-    /// The direction in which the curve goes on.
+    /// Tangent of the curve.
     pub(super) tangent: Tangent<N>,
 }
 
@@ -27,62 +27,62 @@ pub struct Station<P, const N: usize> {
 #[derive(Debug, Clone)]
 pub(super) struct Tangent<const N: usize> {
     pub(super) motion: Direction<N>,
-    /// The metric's force on it.
+    /// Product of the metric with the motion.
     pub(super) force: Vec<NodeVector<N>>,
     pub(super) parameter: f64,
 }
 
-/// What happens where the inertia changes.
+/// Kind of an event, where the inertia changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Turn {
     /// The parameter turns back.
     Fold,
     /// Another curve crosses, or several.
     Bifurcation,
-    /// The parameter turns back where another curve crosses, and this one is its own mirror image.
+    /// The parameter turns back where another curve crosses, and the followed curve is its own mirror image.
     Apex,
 }
 
-/// A place on a curve where the second variation is singular.
+/// A point of a curve where the second variation is singular.
 #[derive(Debug, Clone)]
 pub struct Event<P, const N: usize> {
-    /// What happens.
+    /// Kind of the event.
     pub turn: Turn,
-    /// Parameter at the place.
+    /// Parameter of the event.
     pub parameter: f64,
-    /// The station next to the place.
+    /// The station next to the event.
     pub station: Station<P, N>,
-    /// Negative eigenvalues before and after.
+    /// Numbers of negative eigenvalues before and after the event.
     pub negative: [usize; 2],
     /// The direction in which the second variation vanishes.
     pub mode: Mode<N>,
 }
 
-/// Why a curve ended.
+/// Reason of the end of a curve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum End<R> {
     /// The parameter has left its range.
     Range,
-    /// At an event: the first, as asked, or one beyond which it would be its own mirror image.
+    /// At an event: the first one, by [`Events::EndAtFirst`], or an apex, beyond which the curve is its own mirror image.
     Event,
-    /// The curve has come back to where it began.
+    /// The curve is closed.
     Closed,
-    /// All stations that were allowed are used up.
+    /// The largest count of stations was reached.
     Budget,
-    /// No step, however short, leads on.
+    /// Newton's method fails for steps of all lengths.
     Lost,
-    /// The caller asked to end, for a reason of its own.
+    /// The caller ended the curve, for a reason of its own.
     Stopped(R),
 }
 
 /// A stretch of a curve, which may have been ended for a reason `R` of the caller's.
 #[derive(Debug, Clone)]
 pub struct Curve<P, R, const N: usize> {
-    /// Its stations in order; the events are among them.
+    /// Stations in order, those of events included.
     pub stations: Vec<Station<P, N>>,
-    /// Its events in order, each with its place among the stations.
+    /// Events in order, each with its index among the stations.
     pub events: Vec<(usize, Event<P, N>)>,
-    /// Why it ended.
+    /// Reason of its end.
     pub end: End<R>,
 }
 
@@ -91,30 +91,30 @@ pub struct Curve<P, R, const N: usize> {
 pub struct Pace {
     /// Longest step.
     pub longest: f64,
-    /// Most stations of a curve.
+    /// Largest count of stations of a curve.
     pub stations: usize,
-    /// What to do about events.
+    /// Treatment of events.
     pub events: Events,
 }
 
-/// What to do where the inertia changes.
+/// Treatment of events, where the inertia changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Events {
-    /// Go on without looking.
+    /// Events are not located.
     Ignore,
-    /// Find the place.
+    /// Every event is located.
     Find,
-    /// Find the first place, and end there.
+    /// The first event is located and ends the curve.
     EndAtFirst,
 }
 
 impl<P, const N: usize> Station<P, N> {
-    /// Cosine of the angle between the curve here and there.
+    /// Cosine of the angle between the tangents of two stations.
     pub(super) fn cosine(&self, other: &Self) -> f64 {
         self.tangent.dot(&other.tangent)
     }
 
-    /// What happens on the way to the next station, if anything does.
+    /// Kind of the event between this station and the next; `None` without an event.
     pub(super) fn turn_before(&self, next: &Self) -> Option<Turn> {
         let turns_back = (self.tangent.parameter < 0.0) != (next.tangent.parameter < 0.0);
         match (turns_back, self.negative.abs_diff(next.negative)) {

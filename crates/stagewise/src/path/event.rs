@@ -1,4 +1,4 @@
-//! Where between two stations the second variation becomes singular.
+//! Events between two stations, where the second variation becomes singular.
 
 use super::continuation::Continuation;
 use super::curve::{Event, Station, Turn};
@@ -7,26 +7,28 @@ use super::family::Family;
 impl<F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
     Continuation<'_, F, X, U, N>
 {
-    /// What happens between two stations, and where.
+    /// The event between two stations.
     ///
-    /// The place is bracketed and closed in on by the secant. Very near to it the system is all but singular, and no step may
-    /// lead there any more; what is sought is smooth, so that the last secant tells the rest.
+    /// A bracket of the event is narrowed by the secant method (Illinois). Next to the event the system is nearly singular,
+    /// and steps may fail; the function is smooth, so that the last secant extrapolates.
     pub(super) fn event_between(
         &self,
         from: &Station<F::Point, N>,
         to: &Station<F::Point, N>,
         length: f64,
     ) -> Option<Event<F::Point, N>> {
+        /// Largest count of secant steps; a number.
         const ITERATIONS: usize = 30;
-        /// As close in the parameter as is worth while, in the unit of distance.
-        const CLOSE: f64 = 1e-9;
-        /// Where the last steps lead no nearer than this, in the unit of distance, the value need not be smooth in between.
-        const SHARP: f64 = 1e-5;
-        /// Where to look instead, between the two, where no step leads to the place.
-        const SHARES: [f64; 5] = [0.5, 0.25, 0.75, 0.1, 0.9];
+        /// Distance in the parameter at which the bracket has converged; in [`Scales::distance`](crate::Scales::distance).
+        const CONVERGED: f64 = 1e-9;
+        /// Width of the bracket in the parameter below which the function is smooth between its ends; in
+        /// [`Scales::distance`](crate::Scales::distance).
+        const SMOOTH: f64 = 1e-5;
+        /// Shares of the bracket that are tried where no step leads to the secant's place; dimensionless.
+        const FALLBACK_SHARES: [f64; 5] = [0.5, 0.25, 0.75, 0.1, 0.9];
         let turn = from.turn_before(to)?;
         let crossing = from.negative.min(to.negative) + 1;
-        // What changes its sign.
+        // The function that changes its sign at the event.
         let place = |length: f64, station: Station<F::Point, N>| {
             let value = match turn {
                 Turn::Fold | Turn::Apex => station.tangent.parameter,
@@ -58,10 +60,11 @@ impl<F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
                 }
                 Turn::Bifurcation => (high.station.parameter - low.station.parameter).abs(),
             };
-            if is_close < CLOSE * self.unit {
+            if is_close < CONVERGED * self.unit {
                 break;
             }
-            let aside = SHARES.map(|share| low.length + share * (high.length - low.length));
+            let aside =
+                FALLBACK_SHARES.map(|share| low.length + share * (high.length - low.length));
             let mut nexts = std::iter::once(next).chain(aside);
             let next = nexts.find_map(|next| {
                 let station = self.step(from, &from.tangent, next)?;
@@ -70,7 +73,7 @@ impl<F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
             let Some(next) = next else {
                 break;
             };
-            // The end that stays a second time counts for less, lest it stay for ever.
+            // Illinois: an end of the bracket that stays twice is weighted by one half.
             let is_low = (next.value < 0.0) == (low.value < 0.0);
             weights = match (is_low, stays) {
                 (true, Some(true)) => [1.0, 0.5 * weights[1]],
@@ -86,9 +89,9 @@ impl<F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
         let share = low.value / (low.value - high.value);
         let [a, b] = [&low, &high].map(|place| place.station.parameter);
         let nearest = if share < 0.5 { low } else { high };
-        let is_sharp = (b - a).abs() < SHARP * self.unit;
+        let is_smooth = (b - a).abs() < SMOOTH * self.unit;
         let parameter = match turn {
-            Turn::Bifurcation if is_sharp => a + share * (b - a),
+            Turn::Bifurcation if is_smooth => a + share * (b - a),
             _ => nearest.station.parameter,
         };
         let mode = self.modes(&nearest.station, crossing)?;
@@ -103,7 +106,7 @@ impl<F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
     }
 }
 
-/// A station so far along a step, and the value there of what is zero at an event.
+/// A station at a length along a step, and the value of the function that is zero at an event.
 struct Place<P, const N: usize> {
     length: f64,
     value: f64,

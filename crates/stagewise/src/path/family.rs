@@ -1,9 +1,9 @@
-//! Programmes by one parameter.
+//! One-parameter families of programmes.
 
 use crate::linear::{Direction, Response};
 use crate::program::{Distance, Program, Scales, Stationary};
 
-/// Programmes by one parameter.
+/// A one-parameter family of programmes.
 pub trait Family<const X: usize, const U: usize, const N: usize> {
     /// A point of every programme.
     type Point: Distance;
@@ -13,39 +13,53 @@ pub trait Family<const X: usize, const U: usize, const N: usize> {
     /// The programme at a value of the parameter; `None` where there is none.
     fn at(&self, parameter: f64) -> Option<Self::Program>;
 
-    /// Units of the programmes; the parameter is measured in that of distance.
+    /// Units of the programmes; the unit of the parameter is that of distance.
     fn scales(&self) -> Scales {
         Scales::default()
     }
 
-    /// Derivative of the first-order conditions by the parameter; `None` where it cannot be told.
+    /// Derivative by the parameter of the first-order conditions of the programme there; `None` where it cannot be evaluated.
     ///
-    /// Unless the family knows better: by central differences, one-sided at the end of the parameters that it knows.
+    /// By default [`by_differences`].
     fn conditions_by_parameter(
         &self,
+        _program: &Self::Program,
         at: &Stationary<Self::Point>,
         parameter: f64,
     ) -> Option<Direction<N>> {
-        /// Step of the differences, in the unit of distance.
-        const STEP: f64 = 1e-5;
-        let h = STEP * self.scales().distance;
-        let conditions = |parameter: f64| {
-            let program = self.at(parameter)?;
-            Response::conditions_of(&program, at)
-        };
-        let (mut high, low, width) = match (conditions(parameter + h), conditions(parameter - h)) {
-            (Some(high), Some(low)) => (high, low, 2.0 * h),
-            (Some(high), None) => (high, conditions(parameter)?, h),
-            (None, Some(low)) => (conditions(parameter)?, low, h),
-            (None, None) => return None,
-        };
-        high.add(-1.0, &low);
-        high.scale(width.recip());
-        Some(high)
+        by_differences(self, at, parameter)
     }
 }
 
-/// A single programme is a family too.
+/// Derivative by the parameter of the first-order conditions of a family's programmes by central differences, one-sided at the
+/// end of the parameters that the family knows; `None` where there is none to either side.
+pub fn by_differences<F, const X: usize, const U: usize, const N: usize>(
+    family: &F,
+    at: &Stationary<F::Point>,
+    parameter: f64,
+) -> Option<Direction<N>>
+where
+    F: Family<X, U, N> + ?Sized,
+{
+    /// Step of the finite differences in the parameter; in [`Scales::distance`].
+    const STEP: f64 = 1e-5;
+    let h = STEP * family.scales().distance;
+    let conditions = |parameter: f64| {
+        let program = family.at(parameter)?;
+        Response::conditions_of(&program, at)
+    };
+    let (mut high, low, width) = match (conditions(parameter + h), conditions(parameter - h)) {
+        (Some(high), Some(low)) => (high, low, 2.0 * h),
+        (Some(high), None) => (high, conditions(parameter)?, h),
+        (None, Some(low)) => (conditions(parameter)?, low, h),
+        (None, None) => return None,
+    };
+    high.add(-1.0, &low);
+    high.scale(width.recip());
+    Some(high)
+}
+
+/// A family whose programme does not depend on the parameter.
 pub(super) struct Alone<'a, P>(pub(super) &'a P);
 
 impl<'a, P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> Family<X, U, N>

@@ -1,25 +1,25 @@
-//! Predictor–corrector: follows a minimum while its programme changes. Predicts by the last factorisation, corrects by
-//! Newton's method, takes no step that might lead to another minimum, and says where there is no more to follow.
+//! Predictor–corrector: follows a minimum while its programme changes. The predictor uses the last factorisation, the
+//! corrector is Newton's method. Steps that might lead to another minimum are refused, and the loss of a minimum is reported.
 
 use crate::interior_point::{Outcome, PrimalDual, Residuals, Settings, Solution, minimise};
 use crate::linear::chain::NodeVector;
 use crate::program::{Distance, Multipliers, Program, Stationary, Values};
 use std::ops::ControlFlow;
 
-/// How a minimum was followed.
+/// Report on a minimum that was followed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Followed {
-    /// Steps of Newton's method.
+    /// Count of Newton steps.
     pub iterations: usize,
-    /// Residuals where it ended.
+    /// Residuals at the end.
     pub residuals: Residuals,
-    /// Whether the minimum ceased to be one on the way, and this is another.
+    /// Whether the minimum was lost on the way, and the point at the end is another minimum.
     pub jumped: bool,
-    /// Whether the end of the way was reached; if not, the minimum is the last that was found.
+    /// Whether the end of the way was reached; if not, the point is the last minimum on the way.
     pub arrived: bool,
 }
 
-/// A minimum, and all that it takes to follow it: nothing is allocated on the way but for links.
+/// A minimum with the work arrays to follow it: only programmes with constraints between pairs allocate on the way.
 pub struct Follower<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> {
     iterate: PrimalDual<P, X, U, N>,
     settings: FollowSettings,
@@ -36,12 +36,12 @@ pub struct Follower<P: Program<X, U, N>, const X: usize, const U: usize, const N
 pub struct FollowSettings {
     /// Largest residual of a minimum.
     pub tolerance: f64,
-    /// Distance between minima up to which a step downhill is no jump, in the unit of [`Distance`]: that of an inequality
-    /// which passes from one stage to the next.
+    /// Distance between minima up to which a descent is no jump, in the unit of [`Distance`]: an active inequality that moves
+    /// from a stage to the next causes distances up to this size.
     pub smallest_jump: f64,
 }
 
-/// How far a minimum has been followed on a way of length 1.
+/// Progress on a way of length 1.
 struct Way {
     done: f64,
     stride: f64,
@@ -54,14 +54,14 @@ impl<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> Follow
 where
     P::Point: Distance,
 {
-    /// Starts at a minimum; `None` where it is none that can be followed.
+    /// Starts at a minimum; `None` where the point is no regular minimum.
     pub fn new(
         program: P,
         settings: FollowSettings,
         minimum: &Stationary<P::Point>,
     ) -> Option<Self> {
         let (mut iterate, _) = PrimalDual::new(program, 0.0, minimum.point.clone());
-        // Half of the complementarity that is allowed: the higher, the farther a Newton step is good for.
+        // Half of the tolerance: a higher barrier parameter gives Newton steps a larger radius of convergence.
         let heaviest = iterate.barrier.heaviest();
         iterate.barrier.parameter = 0.5 * settings.tolerance / heaviest;
         let mut follower = Self {
@@ -76,7 +76,7 @@ where
         started.then_some(follower)
     }
 
-    /// The programme as it is now.
+    /// The present programme.
     pub fn program(&self) -> &P {
         &self.iterate.program
     }
@@ -86,28 +86,30 @@ where
         &self.iterate.point
     }
 
-    /// Its values.
+    /// Values at the present minimum.
     pub fn values(&self) -> &Values {
         &self.iterate.values
     }
 
-    /// Its multipliers.
+    /// Multipliers at the present minimum.
     pub fn multipliers(&self) -> &Multipliers {
         &self.iterate.multipliers
     }
 
-    /// Follows the minimum while `change` takes the programme from where it is, at 0, to where it should be, at 1, which is
-    /// `length` away: in one stride, or where that might lose it in shorter ones. Where it ends it gives way to the next
-    /// minimum downhill, and that is followed on. The programme ends at 1.
+    /// Follows the minimum while `change` takes the programme along a way of a `length`, from share 0 to share 1: in one
+    /// stride, or in shorter strides where a stride might lose the minimum. Where the minimum ends, the next minimum downhill
+    /// takes its place. The programme ends at share 1.
     ///
-    /// `proceed` is asked once a stride whether to go on.
+    /// `proceed` is called once a stride, and interrupts by `Break`.
     pub fn follow(
         &mut self,
         length: f64,
         change: &mut dyn FnMut(&mut P, f64),
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Followed {
-        const SHORTEST: f64 = 1e-4;
+        /// Length of the shortest stride, as a share of the way; dimensionless.
+        const SHORTEST_STRIDE: f64 = 1e-4;
+        /// Largest count of leaps to another minimum on one way; a number.
         const MOST_LEAPS: usize = 20;
         let mut way = Way {
             done: 0.0,
@@ -124,13 +126,13 @@ where
             way.iterations += iterations;
             let arrived = kept || {
                 self.go_back();
-                way.stride <= SHORTEST && self.leap(length, next, &mut way, proceed)
+                way.stride <= SHORTEST_STRIDE && self.leap(length, next, &mut way, proceed)
             };
             if arrived {
                 self.keep();
                 way.done = next;
                 way.stride *= 2.0;
-            } else if way.stride <= SHORTEST {
+            } else if way.stride <= SHORTEST_STRIDE {
                 break;
             } else {
                 way.stride *= 0.25;
@@ -145,7 +147,7 @@ where
         }
     }
 
-    /// Goes downhill from the last minimum where the shortest stride has lost it; false where that leads nowhere.
+    /// Descends from the last minimum where the shortest stride has lost it; false where the descent finds no minimum.
     fn leap(
         &mut self,
         length: f64,
@@ -153,16 +155,17 @@ where
         way: &mut Way,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> bool {
-        /// As near to the minimum that was lost as a step may begin.
-        const NEAR: f64 = 1e-5;
+        /// Barrier parameter with which a leap begins, low enough to stay near the lost minimum; objective per unit weight.
+        const FIRST_BARRIER: f64 = 1e-5;
+        /// Largest count of interior-point iterations of a leap; a number.
         const ITERATIONS: usize = 300;
-        /// A smooth way leads no farther than so many times its length.
+        /// Ratio of the distance between minima to the length of the way up to which the way is smooth; dimensionless.
         const SMOOTH: f64 = 100.0;
         way.leaps += 1;
         let settings = Settings {
             tolerance: self.settings.tolerance,
             iterations: ITERATIONS,
-            barrier: NEAR,
+            barrier: FIRST_BARRIER,
         };
         let found = minimise(
             &self.iterate.program,
@@ -180,7 +183,7 @@ where
         self.start_from(&found.at)
     }
 
-    /// Takes over a minimum; false where it is none that can be followed.
+    /// Starts from a minimum; false where the point is no regular minimum.
     fn start_from(&mut self, minimum: &Stationary<P::Point>) -> bool {
         let iterate = &mut self.iterate;
         iterate.point.copy_from(&minimum.point);
@@ -193,7 +196,7 @@ where
         admissible && kept
     }
 
-    /// The minimum where it is now.
+    /// The present minimum as a solution.
     pub fn solution(&mut self) -> Solution<P::Point> {
         let residuals = self.iterate.residuals();
         let iterate = &mut self.iterate;
@@ -214,14 +217,14 @@ where
         solution
     }
 
-    /// Goes back to where the last way began, and so does the programme.
+    /// Returns to the minimum at the start of the last way; `change` sets the programme back.
     pub fn return_to_start(&mut self, change: impl FnOnce(&mut P)) {
         change(&mut self.iterate.program);
         self.last.copy_from(&self.first);
         self.go_back();
     }
 
-    /// Predicts, then corrects; the steps taken, and whether it is the same minimum.
+    /// Predictor, then corrector; gives the count of steps, and whether the minimum was kept.
     fn stride(&mut self) -> (usize, bool) {
         let iterate = &mut self.iterate;
         let admissible = iterate
@@ -231,7 +234,7 @@ where
             return (0, false);
         }
         iterate.find_barrier_gradient();
-        // Where the programme has changed, the equalities pull another way.
+        // A change of the programme changes the gradients of the equalities too.
         iterate
             .program
             .equality_gradients(&iterate.point, &mut self.gradients);
@@ -257,15 +260,18 @@ where
         (steps + 1, kept)
     }
 
-    /// Newton steps until all residuals are within the tolerance; false where they do not get shorter, each against the one
-    /// before and the first against what is expected, or where it is no minimum. The last point is factorised too: there it
-    /// shows whether that is one, and from there the next prediction is made.
+    /// Newton steps until all residuals are within the tolerance. False where the steps do not contract, the first against
+    /// the expected length, or where the point is no minimum. The factorisation at the last point decides whether the point
+    /// is a minimum, and serves the next predictor.
     fn correct(&mut self, expected: f64) -> (usize, bool) {
-        const MOST: usize = 12;
-        const SHORTER: f64 = 0.7;
+        /// Largest count of Newton steps of one correction; a number.
+        const CORRECTIONS: usize = 12;
+        /// Ratio of successive Newton steps up to which they converge; dimensionless.
+        const CONTRACTION: f64 = 0.7;
+        /// Length of a Newton step that is rounding; in the unit of the unknowns.
         const ROUNDING: f64 = 1e-9;
-        let mut expected = SHORTER * expected;
-        for steps in 0..MOST {
+        let mut expected = CONTRACTION * expected;
+        for steps in 0..CORRECTIONS {
             if !self.factorise() {
                 return (steps, false);
             }
@@ -279,26 +285,26 @@ where
             let Some(taken) = take(iterate).filter(|_| shorter) else {
                 return (steps + 1, false);
             };
-            expected = left(taken, SHORTER) * now;
+            expected = left(taken, CONTRACTION) * now;
             iterate.linearise();
         }
-        (MOST, false)
+        (CORRECTIONS, false)
     }
 
-    /// Factorises at the present point; false where it is concave along the constraints.
+    /// Factorises at the present point; false where the second derivative is not positive on the tangent space.
     fn factorise(&mut self) -> bool {
         self.iterate.assemble();
         self.iterate.kkt.factorise_damped(0.0).is_ok()
     }
 
-    /// Makes the present point the one to go back to.
+    /// Stores the present point as the last minimum.
     fn keep(&mut self) {
         let iterate = &self.iterate;
         self.last.point.copy_from(&iterate.point);
         self.last.multipliers.copy_from(&iterate.multipliers);
     }
 
-    /// Goes back to the last minimum, with its factorisation.
+    /// Returns to the last minimum, with its factorisation.
     fn go_back(&mut self) {
         let iterate = &mut self.iterate;
         iterate.point.copy_from(&self.last.point);
@@ -307,7 +313,7 @@ where
             .program
             .evaluate(&mut iterate.point, &mut iterate.values);
         iterate.linearise();
-        // At a minimum it has been factorised before.
+        // The factorisation at the last minimum has succeeded before.
         self.factorise();
     }
 }
@@ -320,13 +326,13 @@ fn size<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>(
     squares.sum::<f64>().sqrt()
 }
 
-/// The share that is left of a step of which a share has been taken, where a whole one leaves `rest`.
+/// Expected ratio of the next step to a step of which a share was taken, where the whole step leaves the ratio `rest`.
 fn left(taken: f64, rest: f64) -> f64 {
     1.0 - taken * (1.0 - rest)
 }
 
-/// Takes the present step as far as slacks and multipliers stay positive, and gives the share that was taken; `None` where it
-/// leaves the domain.
+/// Takes the share of the present step that keeps slacks and multipliers positive; gives the share, or `None` outside the
+/// domain.
 fn take<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>(
     iterate: &mut PrimalDual<P, X, U, N>,
 ) -> Option<f64> {

@@ -1,5 +1,5 @@
-//! From one stationary point to another of the same programme: a load along a mode grows, and the curve is followed until
-//! the load is nothing again.
+//! Modal load homotopy, from one stationary point of a programme to another: a load along a mode grows, and the curve is
+//! followed until the load is zero again.
 
 use super::continuation::Continuation;
 use super::curve::{End, Events, Pace};
@@ -7,7 +7,8 @@ use super::family::Family;
 use crate::layout::Layout;
 use crate::linear::chain::NodeVector;
 use crate::linear::{Mode, Response};
-use crate::program::{Distance, Linearisation, Multipliers, Program, Scales, Stationary, Values};
+use crate::linearisation::Linearisation;
+use crate::program::{Distance, Multipliers, Program, Scales, Stationary, Values};
 use nalgebra::SMatrix;
 use std::ops::ControlFlow;
 
@@ -17,14 +18,14 @@ struct Loaded<P, const N: usize> {
     force: Vec<NodeVector<N>>,
 }
 
-/// The same load at any strength.
+/// The family of programmes by the strength of a modal load.
 struct ModalLoad<'a, P, const N: usize> {
     program: &'a P,
     force: Vec<NodeVector<N>>,
 }
 
-/// The stationary point that continuation in a modal load leads to, from none to none: a dead force along a mode, or against
-/// it. `None` where the load never vanishes again, or only where it began.
+/// The stationary point at the end of a modal load homotopy: continuation in a dead force along a mode, or against the mode,
+/// from zero load to zero load. `None` where the load does not return to zero.
 pub fn over_modal_load<P, const X: usize, const U: usize, const N: usize>(
     program: &P,
     tolerance: f64,
@@ -37,12 +38,13 @@ where
     P: Program<X, U, N> + Clone,
     P::Point: Distance,
 {
-    /// Longest step, in the unit of distance.
+    /// Length of the longest step along the curve; in [`Scales::distance`].
     const LONGEST: f64 = 0.05;
+    /// Largest count of stations of the curve; a number.
     const STATIONS: usize = 80;
-    /// Stiffness of a stiff mode, in the unit of eigenvalues: a load of strength 1 displaces it by 1.
+    /// Stiffness of a stiff mode, so that a load of strength 1 displaces it by 1; in [`Scales::eigenvalue`].
     const STIFF: f64 = 300.0;
-    /// Largest strength, in the unit of distance.
+    /// Strength of the largest load; in [`Scales::distance`].
     const FAR: f64 = 1e6;
     let scales = program.scales();
     let pace = Pace {

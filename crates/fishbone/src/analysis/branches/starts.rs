@@ -1,4 +1,4 @@
-//! Where the search for all equilibria starts.
+//! Starts of the search for all equilibria.
 
 use super::{SearchSettings, Wave};
 use crate::equilibrium::guess::{guess, waved};
@@ -8,7 +8,7 @@ use nalgebra::Vector2;
 use std::f64::consts::PI;
 
 /// Shapes from which to search: arches to both sides and the straight belt with waves of bend and of rib slope over them,
-/// then sums of waves that cover the space of such sums evenly.
+/// then sums of waves that cover their space evenly.
 pub(super) fn starts(problem: &Problem, settings: &SearchSettings) -> Vec<BeltPoint> {
     let program = problem.program(problem.elements());
     let bulge = problem.bulge();
@@ -42,7 +42,7 @@ impl Wave {
     }
 }
 
-/// Waves of bend in a sum, and of rib slope; a number.
+/// Waves of bend in a sum, and of rib slope, a number.
 const WAVES: usize = 5;
 
 /// Sums of waves of bend and rib slope.
@@ -52,10 +52,12 @@ struct Sum {
 }
 
 impl Sum {
-    /// The i-th of a sequence that covers all evenly: bends up to one and a half times that of a ring and slopes up to 0.5, root mean square.
+    /// The i-th of a sequence that covers all sums evenly: bends up to one and a half times that of a ring and slopes up to
+    /// 0.5, root mean square.
     ///
     /// Source: M. Roberts, "The unreasonable effectiveness of quasirandom sequences" (2018).
     fn new(i: usize) -> Self {
+        /// Dimensions of the space of sums, a number.
         const NUMBERS: usize = 2 + 4 * WAVES;
         // The root of x^(d+1) = x + 1, d the number of dimensions.
         let mut root: f64 = 1.0;

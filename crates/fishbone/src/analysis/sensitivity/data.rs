@@ -1,33 +1,37 @@
-//! What an element is made of, and how its energy and its bounds depend on that.
+//! The data of an element, and the derivatives of its energy and its bounds by them.
 
 use crate::geometry::gauss_points;
-use crate::strip::developable::{Curl, EnergyModel};
+use crate::strip::bounds::{ActiveEdges, Edge, RibBounds};
+use crate::strip::developable::EnergyModel;
+use crate::strip::element::Curl;
 use crate::strip::element::Element;
-use crate::strip::ribs::{Across, Edge, Strips};
+use crate::strip::ribs::{Across, Strips};
 use nalgebra::{Matrix4, SVector, Vector2, Vector4};
 use num_dual::{DualNum, HyperDualSVec64, partial_hessian};
 
-/// Of an element: R_f at its two Gauss points, its natural bend, and half its width.
+/// Data of an element: R_f at its two Gauss points, its natural bend, and half its width.
 pub(super) type Data = Vector4<f64>;
-/// Places in [`Data`].
+/// Place of the natural bend in [`Data`], an index.
 pub(super) const NATURAL_BEND: usize = 2;
+/// Place of the half width in [`Data`], an index.
 pub(super) const HALF_WIDTH: usize = 3;
 
 /// Derivatives of an element's part of the Lagrangian by its data.
 #[derive(Debug, Clone)]
 pub(super) struct ByData {
-    /// First ones.
+    /// First derivatives.
     pub(super) first: Data,
-    /// Second ones, by the four unknowns and by the data.
+    /// Second derivatives, by the four unknowns and by the data.
     pub(super) mixed: Matrix4<f64>,
-    /// Derivatives of the slacks by half the width, of those that bound something.
+    /// Derivatives of the slacks by half the width.
     pub(super) slacks: Vec<f64>,
 }
 
 impl ByData {
-    /// At some fields, with the multipliers of the slacks that bound something.
+    /// The derivatives at given fields and multipliers of the inequalities.
     pub(super) fn at(
         element: &Element,
+        bounds: &RibBounds,
         model: EnergyModel,
         fields: &Vector4<f64>,
         multipliers: &[f64],
@@ -47,16 +51,19 @@ impl ByData {
         );
         let jets = partial_hessian(
             |(slopes, half): (SVector<HyperDualSVec64<2, 1>, 2>, SVector<_, 1>)| {
-                strips(element, half[0]).slacks(slopes.into())
+                let widened = RibBounds {
+                    strips: strips(element, half[0]),
+                    edges: &wider(bounds.edges, half[0] - element.half_width),
+                };
+                widened.slacks(slopes.into())
             },
             (
                 &Vector2::new(fields[1], fields[3]),
                 &SVector::from([element.half_width]),
             ),
         );
-        let bounds: Vec<usize> = element.strips().bounds().collect();
-        for (bound, multiplier) in bounds.iter().zip(multipliers) {
-            let (_, _, by_width, by_both) = &jets[*bound];
+        for (place, multiplier) in bounds.places().zip(multipliers) {
+            let (_, _, by_width, by_both) = &jets[place];
             first[HALF_WIDTH] -= multiplier * by_width[0];
             mixed[(1, HALF_WIDTH)] -= multiplier * by_both[0];
             mixed[(3, HALF_WIDTH)] -= multiplier * by_both[1];
@@ -64,12 +71,12 @@ impl ByData {
         Self {
             first,
             mixed,
-            slacks: bounds.iter().map(|bound| jets[*bound].2[0]).collect(),
+            slacks: bounds.places().map(|place| jets[place].2[0]).collect(),
         }
     }
 }
 
-/// The energy of an element made of other data.
+/// The energy of an element with other data.
 fn energy<D: DualNum<Primitive = f64> + Copy>(
     element: &Element,
     model: EnergyModel,
@@ -99,48 +106,52 @@ fn energy<D: DualNum<Primitive = f64> + Copy>(
 }
 
 /// The strips of an element of another width.
-///
-/// The edges of the board are half a width off its spine. Where they end on another edge does not matter but for the
-/// last tangent of an arc, which is kept.
-fn strips<D: DualNum<Primitive = f64> + Copy>(element: &Element, half_width: D) -> Strips<D> {
-    let more = half_width - element.half_width;
-    let wider = |edge: &Edge, side: f64| Edge {
-        direction: edge.direction,
-        distance: more * side + edge.distance,
-        curvature: match edge.curvature == 0.0 {
-            true => D::zero(),
-            // Further edges that curve are inner ones: the wider the belt, the less their radius.
-            false => (more * -side + 1.0 / edge.curvature).recip(),
-        },
-        turn: edge.turn,
-    };
-    let [minus, plus, own] = &element.further;
+fn strips<D>(element: &Element, half_width: D) -> Strips<D> {
     Strips {
         half_width,
         geodesic: element.geodesic,
         length: element.length,
-        further: [
-            minus.as_ref().map(|edge| wider(edge, -1.0)),
-            plus.as_ref().map(|edge| wider(edge, 1.0)),
-            own.as_ref()
-                .map(|edge| wider(edge, edge.curvature.signum())),
-        ],
     }
+}
+
+/// The active edges of a board of a larger half width.
+///
+/// The edges of the board are half a width off its spine. Where they end on another edge does not matter but for the
+/// last tangent of an arc, which is kept.
+fn wider<D: DualNum<Primitive = f64> + Copy>(edges: &ActiveEdges, more: D) -> ActiveEdges<D> {
+    let moved = |edge: &Edge, side: f64| Edge {
+        direction: edge.direction,
+        distance: more * side + edge.distance,
+        curvature: match edge.curvature == 0.0 {
+            true => D::zero(),
+            // Active edges that curve are inner ones: the wider the belt, the less their radius.
+            false => (more * -side + 1.0 / edge.curvature).recip(),
+        },
+        turn: edge.turn,
+    };
+    let [minus, plus, own] = edges;
+    [
+        minus.as_ref().map(|edge| moved(edge, -1.0)),
+        plus.as_ref().map(|edge| moved(edge, 1.0)),
+        own.as_ref()
+            .map(|edge| moved(edge, edge.curvature.signum())),
+    ]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::board::reach::further_edges;
+    use crate::board::reach::edges_in_reach;
     use crate::board::samples::{Part, Plan};
     use crate::geometry::Pose;
     use crate::strip::density::{Derivatives, Loaded};
+    use crate::strip::element::increment;
+    use crate::strip::energy::Jet;
     use crate::strip::kernel::Block;
-    use crate::strip::ribs::FURTHER;
     use nalgebra::Vector6;
     use num_dual::Dual64;
 
-    fn element(further: [Option<Edge>; FURTHER]) -> Element {
+    fn element() -> Element {
         Element {
             length: 0.0125,
             geodesic: 1.4,
@@ -150,7 +161,6 @@ mod tests {
                 bend: 2.0,
                 poisson: 0.3,
             },
-            further,
         }
     }
 
@@ -161,7 +171,10 @@ mod tests {
         let loaded = Loaded {
             element,
             fields: [&a, &b],
-            poses: [&Pose::identity(), &element.increment(fields)],
+            poses: [
+                &Pose::identity(),
+                &increment(element.length, element.geodesic, fields),
+            ],
             wrench: &Vector6::zeros(),
         };
         block.set(0, &model, &loaded);
@@ -174,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn test_further_edges_move_with_the_width_as_those_of_the_board_do() {
+    fn test_active_edges_move_with_the_width_as_those_of_the_board_do() {
         let leg = Part::Straight(0.4);
         let parts = [leg, Part::Corner(1.0), leg, Part::Arc(0.2, 4.0), leg];
         let mirrored = [leg, Part::Corner(-1.0), leg, Part::Arc(0.2, -4.0), leg];
@@ -184,12 +197,12 @@ mod tests {
             let mut spine = Plan::open(0.1, &parts).spine();
             let mut of_width = |width: f64| {
                 spine.width = width;
-                further_edges(&spine)
+                edges_in_reach(&spine)
             };
             let [below, at, above] = [-step, 0.0, step].map(|by| of_width(0.1 + 2.0 * by));
             for ((below, at), above) in below.iter().zip(&at).zip(&above) {
-                let wider = strips(&element(at.1), Dual64::from(0.05).derivative());
-                for (i, edge) in wider.further.iter().enumerate() {
+                let wider = wider(&at.1, Dual64::from(0.0).derivative());
+                for (i, edge) in wider.iter().enumerate() {
                     let (Some(edge), Some(below), Some(above)) = (edge, below.1[i], above.1[i])
                     else {
                         continue;
@@ -214,21 +227,28 @@ mod tests {
             turn: [-0.5, 0.4],
         };
         let line = Edge::line(Vector2::new(0.8, 0.6), 0.03);
-        let element = element([None, Some(line), Some(arc)]);
+        let (element, edges) = (element(), [None, Some(line), Some(arc)]);
         let fields = Vector4::new(3.0, 0.3, 2.5, 0.36);
-        let bounds = [0.3, 0.5, 0.7, 0.4];
-        let used: Vec<usize> = element.strips().bounds().collect();
+        let multipliers = [0.3, 0.5, 0.7, 0.4];
+        let bounds = RibBounds {
+            strips: element.strips(),
+            edges: &edges,
+        };
+        let used: Vec<usize> = bounds.places().collect();
         assert_eq!(used, [0, 1, 3, 4]);
+        let jets = |element: &Element| {
+            let bounds = RibBounds {
+                strips: element.strips(),
+                edges: &wider(&edges, element.half_width - 0.05),
+            };
+            bounds.slack_jets([fields[1], fields[3]]).map(Jet::from)
+        };
         let with = |entry: usize, by: f64| {
             let mut other = element;
             match entry {
                 0 | 1 => other.rigidity[entry] += by,
                 NATURAL_BEND => other.curl.bend += by,
-                _ => {
-                    other.half_width += by;
-                    let wider = strips(&element, element.half_width + by);
-                    other.further = wider.further;
-                }
+                _ => other.half_width += by,
             }
             other
         };
@@ -239,14 +259,15 @@ mod tests {
         ] {
             let lagrangian = |element: &Element| {
                 let (mut value, mut gradient) = energy(element, model, &fields);
-                let slacks = element.slack_jets(&fields);
-                for (slack, multiplier) in used.iter().map(|bound| &slacks[*bound]).zip(bounds) {
+                let slacks = jets(element);
+                for (slack, multiplier) in used.iter().map(|place| &slacks[*place]).zip(multipliers)
+                {
                     value -= multiplier * slack.value;
                     gradient -= multiplier * slack.gradient;
                 }
                 (value, gradient)
             };
-            let exact = ByData::at(&element, model, &fields, &bounds);
+            let exact = ByData::at(&element, &bounds, model, &fields, &multipliers);
             for entry in 0..4 {
                 let h = 1e-6;
                 let [more, less] = [h, -h].map(|by| with(entry, by));
@@ -257,10 +278,10 @@ mod tests {
                 let error = (mixed - exact.mixed.column(entry)).amax();
                 assert!(error < 1e-6 * mixed.amax().max(1.0), "{model:?} {entry}");
                 if entry == HALF_WIDTH {
-                    let [above, below] = [&more, &less].map(|element| element.slacks(&fields));
-                    for (bound, exact) in used.iter().zip(&exact.slacks) {
-                        let (above, below) = (above[*bound], below[*bound]);
-                        assert!(((above - below) / (2.0 * h) - exact).abs() < 1e-6);
+                    let [above, below] = [&more, &less].map(jets);
+                    for (place, exact) in used.iter().zip(&exact.slacks) {
+                        let difference = above[*place].value - below[*place].value;
+                        assert!((difference / (2.0 * h) - exact).abs() < 1e-6);
                     }
                 }
             }

@@ -1,4 +1,4 @@
-//! Between the parameters of a scenario and what its programme is made of.
+//! Scales between the parameters of a scenario and the data of its programme.
 
 use super::data::{Data, HALF_WIDTH, NATURAL_BEND};
 use super::system::{Direction, System};
@@ -8,7 +8,7 @@ use crate::problem::program::BeltProgram;
 use crate::problem::{Problem, Units};
 use nalgebra::Vector3;
 
-/// A linear map from parameters to what a programme is made of.
+/// A linear map from parameters to the data of a programme.
 #[derive(Debug)]
 pub(super) struct Scales {
     /// Units of the programme.
@@ -19,7 +19,7 @@ pub(super) struct Scales {
     weight: f64,
     supports: usize,
     segments: usize,
-    /// Of every piece the segment that it is a part of.
+    /// The segment to which every piece belongs.
     segment: Vec<usize>,
 }
 
@@ -58,7 +58,7 @@ impl Scales {
         self.units.energy * self.units.length
     }
 
-    /// What a change of the parameters changes of the programme.
+    /// The change of the programme's data by a change of the parameters.
     pub(super) fn to_program(&self, parameters: &Parameters, system: &System) -> Direction {
         let length = self.units.length;
         let mut direction = system.unchanged();
@@ -80,8 +80,7 @@ impl Scales {
         direction
     }
 
-    /// The derivative by the parameters, from that by what the programme is made of: the transpose of
-    /// [`Self::to_program`].
+    /// The derivative by the parameters, from the derivative by the programme's data: the transpose of [`Self::to_program`].
     pub(super) fn to_scenario(&self, by: &Direction, nodes: usize) -> Parameters {
         let length = self.units.length;
         let supports = by.supports.iter().take(self.supports);

@@ -1,18 +1,18 @@
-//! The linearised first-order conditions of a belt, and what changes of its data put on their right-hand side.
+//! The linearised first-order conditions of a belt, and their right-hand sides for changes of its data.
 
 use super::Motion;
 use super::data::{ByData, Data, HALF_WIDTH};
-use super::motion::{add_pull, motion};
+use super::motion::{add_generalised_force, add_support_motion, motion};
 use crate::equilibrium::Solved;
 use crate::problem::program::{
-    BeltPoint, BeltProgram, DevelopableNode as NodeVector, NodeSupport, Piece, ROWS, Rows, Turn,
-    rows_of, weight,
+    BeltPoint, BeltProgram, DevelopableNode as NodeVector, NodeSupport, Piece, Rows, Turn, rows_of,
+    weight,
 };
 use nalgebra::{Vector3, Vector4};
 use stagewise::{Direction as Step, Program};
 use std::ops::Range;
 
-/// A change of all that a programme is made of, in its units; or a derivative by that.
+/// A change of a programme's data, in its units; or a derivative by such a change.
 #[derive(Debug, Clone)]
 pub(super) struct Direction {
     /// Motions of the supports.
@@ -23,7 +23,7 @@ pub(super) struct Direction {
     pub(super) weight: Vector3<f64>,
 }
 
-/// Derivatives of the Lagrangian by what the programme is made of.
+/// Derivatives of the Lagrangian by the programme's data.
 #[derive(Debug)]
 pub(super) struct System {
     program: BeltProgram,
@@ -64,13 +64,13 @@ impl System {
             .map(|(i, (support, turn))| (i, support, turn))
     }
 
-    /// The elements that bend, each with its number.
+    /// The flexible elements, each with its number.
     fn elements(&self) -> impl Iterator<Item = (usize, &ByData)> {
         let elements = self.elements.iter().enumerate();
         elements.filter_map(|(k, element)| Some((k, element.as_ref()?)))
     }
 
-    /// Nothing changed.
+    /// The zero change.
     pub(super) fn unchanged(&self) -> Direction {
         Direction {
             supports: vec![Motion::default(); self.turns.len()],
@@ -79,26 +79,11 @@ impl System {
         }
     }
 
-    /// Adds what a change puts on the right-hand side.
-    ///
-    /// A support's conditions depend on the turn from its frame to the node's alone. Let these turn by q and e: the
-    /// turn changes by e − q − ½ q × e, so that the mixed second derivative of multipliers times conditions is that by
-    /// e, with the sign changed, and −½ m · (q × e) with their moment m.
+    /// Adds the right-hand side of a change.
     pub(super) fn add_change(&self, change: &Direction, into: &mut Step<8>) {
         for (i, support, turn) in self.supports() {
-            let Motion {
-                translation,
-                rotation,
-            } = &change.supports[i];
-            let position = support.held(translation);
-            let frame = turn.jacobian * rotation;
-            let missed = position.iter().chain(&frame);
-            let rows = &mut into.equalities[ROWS * i..ROWS * (i + 1)];
-            for (row, missed) in rows.iter_mut().zip(missed) {
-                *row -= missed;
-            }
-            let moment = -turn.hessian * rotation - 0.5 * turn.pull.cross(rotation);
-            self.add_pull(support.node, &Vector3::zeros(), &moment, &mut into.nodes);
+            let pose = &self.point.poses[support.node];
+            add_support_motion(support, turn, pose, i, &change.supports[i], into);
         }
         for (k, element) in self.elements() {
             let data = &change.elements[k];
@@ -110,12 +95,12 @@ impl System {
         }
         for (node, force, lever) in self.weights(change.weight) {
             let force = -force;
-            self.add_pull(node, &force, &lever.cross(&force), &mut into.nodes);
+            self.add_generalised_force(node, &force, &lever.cross(&force), &mut into.nodes);
         }
     }
 
-    /// The derivative by a change of a solution's product with what the change puts on the right-hand side: the
-    /// transpose of [`Self::add_change`].
+    /// The derivative, by a change, of a solution's product with the change's right-hand side: the transpose of
+    /// [`Self::add_change`].
     pub(super) fn response(&self, solution: &Step<8>) -> Direction {
         let mut response = self.unchanged();
         for (i, support, turn) in self.supports() {
@@ -124,7 +109,7 @@ impl System {
             response.supports[i] = Motion {
                 translation: -support.held(&rows.fixed_rows::<3>(0).into()),
                 rotation: -turn.jacobian.tr_mul(&rows.fixed_rows::<3>(3)) - turn.hessian * rotation
-                    + 0.5 * turn.pull.cross(&rotation),
+                    + 0.5 * turn.generalised_force.cross(&rotation),
             };
         }
         for (k, element) in self.elements() {
@@ -146,14 +131,14 @@ impl System {
         response
     }
 
-    /// Derivative of the least energy by what the programme is made of: the reactions, for one.
+    /// Derivative of the least energy by the programme's data, among them the reactions.
     pub(super) fn by_change(&self) -> Direction {
         let mut by = self.unchanged();
         for (i, support, turn) in self.supports() {
             let force = self.multipliers[i].fixed_rows::<3>(0).into();
             by.supports[i] = Motion {
                 translation: -support.held(&force),
-                rotation: -turn.pull,
+                rotation: -turn.generalised_force,
             };
         }
         for (k, element) in self.elements() {
@@ -166,19 +151,19 @@ impl System {
         by
     }
 
-    /// The moment by which a support's reaction changes as it turns while the belt stays as it is.
+    /// The change of a support's reaction moment as the support turns and the belt does not move.
     pub(super) fn own_moment(&self, support: usize, rotation: &Vector3<f64>) -> Vector3<f64> {
         let turn = &self.turns[support];
-        turn.hessian * rotation + 0.5 * turn.pull.cross(rotation)
+        turn.hessian * rotation + 0.5 * turn.generalised_force.cross(rotation)
     }
 
     /// The transpose of [`Self::own_moment`].
     pub(super) fn by_own_moment(&self, support: usize, moment: &Vector3<f64>) -> Vector3<f64> {
         let turn = &self.turns[support];
-        turn.hessian * moment - 0.5 * turn.pull.cross(moment)
+        turn.hessian * moment - 0.5 * turn.generalised_force.cross(moment)
     }
 
-    /// The weight of the belt at its nodes: which node, force, lever in world axes.
+    /// The weight of the belt at its nodes: node, force, lever in world axes.
     fn weights(
         &self,
         per_length: Vector3<f64>,
@@ -193,20 +178,20 @@ impl System {
         })
     }
 
-    /// How a node moves along a step.
+    /// Motion of a node along a step.
     pub(super) fn motion(&self, node: usize, step: &[NodeVector]) -> Motion {
         motion(&self.point.poses[node], &step[node])
     }
 
-    /// Adds what pulls at a node to a derivative by the unknowns.
-    pub(super) fn add_pull(
+    /// Adds a generalised force at a node, given as force and moment, to a derivative by the unknowns.
+    pub(super) fn add_generalised_force(
         &self,
         node: usize,
         force: &Vector3<f64>,
         moment: &Vector3<f64>,
         into: &mut [NodeVector],
     ) {
-        add_pull(&self.point.poses[node], force, moment, &mut into[node]);
+        add_generalised_force(&self.point.poses[node], force, moment, &mut into[node]);
     }
 }
 
@@ -221,7 +206,14 @@ fn by_data(
         let [a, b] = [point.fields[k], point.fields[k + 1]];
         let fields = Vector4::new(a[0], a[1], b[0], b[1]);
         let multipliers = &multipliers[rows[k].clone()];
-        by_data[k] = Some(ByData::at(element, program.model, &fields, multipliers));
+        let bounds = program.bounds(k, element);
+        by_data[k] = Some(ByData::at(
+            element,
+            &bounds,
+            program.model,
+            &fields,
+            multipliers,
+        ));
     }
     by_data
 }

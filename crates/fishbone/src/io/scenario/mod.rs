@@ -1,4 +1,4 @@
-//! From text to a validated scenario, and back.
+//! Reading of text into a validated scenario, and writing.
 
 mod node;
 #[cfg(test)]
@@ -10,14 +10,16 @@ use crate::scenario::error::ScenarioError;
 use node::{Node, nearest};
 use serde::Deserialize;
 
-/// Longest TOML text read, in bytes. Its reader takes up to 240 bytes of memory for each, so that this bounds the
-/// memory by half a gigabyte.
-pub const LONGEST_TOML: usize = 2_000_000;
+/// Length of the longest TOML text read, in bytes. Its reader takes up to 240 bytes of memory for each byte of text, so that
+/// the length bounds the memory by half a gigabyte.
+pub(crate) const LONGEST_TOML: usize = 2_000_000;
 
-/// Longest JSON text read, in bytes. Its reader takes some tens of bytes of memory for each.
-pub const LONGEST_JSON: usize = 16_000_000;
+/// Length of the longest JSON text read, in bytes. Its reader takes some tens of bytes of memory for each byte of text.
+pub(crate) const LONGEST_JSON: usize = 16_000_000;
 
+/// Words for the least scenario in TOML, which complete "must be …".
 const LEAST_TOML: &str = r#"at least belt = { width = 0.1, rigidity = 1.0, segments = [{ kind = "straight", length = 1.0 }] }"#;
+/// Words for the least scenario in JSON, which complete "must be …".
 const LEAST_JSON: &str = r#"at least {"belt": {"width": 0.1, "rigidity": 1.0, "segments": [{"kind": "straight", "length": 1.0}]}}"#;
 
 impl Scenario {
@@ -91,7 +93,7 @@ fn from_node(node: Node, least: &str) -> Result<Scenario, ScenarioError> {
     Ok(scenario)
 }
 
-/// The same error with the word that was probably meant.
+/// An error with the word that was probably meant.
 fn with_nearest(mut error: ScenarioError) -> ScenarioError {
     if let ScenarioError::UnknownChoice {
         found,

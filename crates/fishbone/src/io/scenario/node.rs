@@ -1,7 +1,7 @@
-//! A format-free tree of values, and reading the schema from it with exact field paths.
+//! A format-free tree of values, and the reading of the schema from it with exact field paths.
 //!
-//! Serde's own readers of TOML and JSON turn errors into text before the path of the field is known; reading from a
-//! tree of our own keeps them as data, and gives both formats one set of messages.
+//! Serde's own readers of TOML and JSON turn errors into text before the path of the field is known; reading from a tree of
+//! our own keeps errors as data, and gives both formats one set of messages.
 
 use crate::scenario::error::{LONGEST_QUOTE, ScenarioError, cut, number};
 use serde::Deserialize;
@@ -11,7 +11,7 @@ use serde::de::{
 use std::fmt::{self, Display};
 use std::vec;
 
-/// The key under which the TOML reader hands over a date.
+/// Key under which the TOML reader hands over a date, a word.
 const TOML_DATE_KEY: &str = "$__toml_private_datetime";
 
 /// A value of TOML or JSON.

@@ -1,4 +1,4 @@
-//! Facts of the schema: what is read, what is refused, and in which words.
+//! Facts of the schema: the input that is read, the input that is refused, and the words of refusals.
 
 use super::*;
 use crate::scenario::*;
@@ -7,6 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_6};
 
+/// Shipped scenarios, by name and text.
 const SHIPPED: [(&str, &str); 5] = [
     (
         "example1",
@@ -27,7 +28,7 @@ const SHIPPED: [(&str, &str); 5] = [
     ("twist", include_str!("../../../../../scenarios/twist.toml")),
 ];
 
-/// A belt between two clamps with most sections written out, so that one edit reaches any field.
+/// Scenario in TOML of a belt between two clamps, with most sections written out, so that one edit reaches any field.
 const BASE: &str = r#"
 name = "base"
 energy = "sadowsky"
@@ -57,10 +58,13 @@ bulge = [1.0, 0.0, 0.0]
 basis = 10
 "#;
 
+/// Segment in TOML: a straight belt, in m.
 const STRAIGHT: &str = r#"{ kind = "straight", length = 1.0 }"#;
-/// Half a straight belt, for boards of several segments.
+/// Segment in TOML: half a straight belt, for boards of several segments, in m.
 const HALF: &str = r#"{ kind = "straight", length = 0.5 }"#;
+/// Rigidity line of [`BASE`], for edits, in N·m².
 const RIGIDITY: &str = "rigidity = 1.0";
+/// Rotation line of the end's clamp in [`BASE`], for edits, in rad.
 const END_ROTATION: &str = "0.1]\nrotation = [0.0, 0.0, 0.0]";
 
 fn shipped(name: &str) -> Scenario {
@@ -326,7 +330,7 @@ fn segments_of_one_rigidity_are_one_belt() {
     let two = r#"{ kind = "straight", length = 0.4, rigidity = 1.0 }, { kind = "straight", length = 0.6 }"#;
     let belt = Scenario::from_toml(&edited(STRAIGHT, two)).unwrap().belt;
     assert_eq!((belt.length(), belt.rigidity_value()), (1.0, Some(1.0)));
-    // Where every segment has its own, the belt needs none.
+    // A belt needs no rigidity if every segment has its own.
     let own = edited(
         STRAIGHT,
         r#"{ kind = "straight", length = 1, rigidity = 2 }"#,
@@ -428,7 +432,7 @@ fn every_field_reads_at_the_edges_of_its_range() {
 }
 
 #[test]
-fn an_unknown_field_is_named_with_its_path_and_what_was_meant() {
+fn an_unknown_field_is_named_with_its_path_and_the_field_meant() {
     assert_refusals(&[
         (
             "width = 0.1",
@@ -523,7 +527,7 @@ fn an_unknown_word_is_named_with_the_words_allowed() {
 }
 
 #[test]
-fn a_wrong_type_is_named_with_what_was_found_and_what_is_allowed() {
+fn a_wrong_type_is_named_with_the_type_found_and_the_types_allowed() {
     assert_refusals(&[
         (
             "name = \"base\"",
@@ -903,7 +907,7 @@ fn a_value_of_the_material_outside_its_range_is_refused() {
 }
 
 #[test]
-fn a_support_that_makes_no_sense_is_refused() {
+fn an_invalid_support_is_refused() {
     assert_refusals(&[
         (
             END_ROTATION,
@@ -985,7 +989,7 @@ fn a_support_that_makes_no_sense_is_refused() {
 }
 
 #[test]
-fn links_and_loads_that_make_no_sense_are_refused() {
+fn invalid_links_and_loads_are_refused() {
     assert_refusals(&[
         (
             "[solver]",
@@ -1106,9 +1110,9 @@ fn a_solver_setting_outside_its_range_is_refused() {
     );
 }
 
-/// One edit for each thing that a scenario may hold beyond straight belts between two clamps.
+/// One edit for each part that a scenario may hold beyond straight belts between two clamps.
 #[test]
-fn all_that_the_schema_names_is_accepted() {
+fn every_field_of_the_schema_is_accepted() {
     let circuit = "layers = [{ material = \"PET\", thickness = 25e-6 }, { material = \"rolled copper\", thickness = 18e-6 }]";
     let several = format!("{HALF}, {{ kind = \"arc\", length = 0.5, curvature = 40 }}");
     let stiffened = format!("{HALF}, {{ kind = \"rigid\", length = 0.1 }}");
@@ -1235,7 +1239,7 @@ fn a_corner_at_a_stiffener_is_below_90_degrees() {
     }
 }
 
-/// BASE closed, with these supports and whatever else.
+/// BASE closed, with other supports and tables.
 fn closed(rest: &str) -> String {
     let (head, _) = BASE.split_once("[[supports]]").unwrap();
     let belt = head.replace(RIGIDITY, "rigidity = 1.0\nclosed = true\nhalf_turns = -20");
@@ -1343,7 +1347,7 @@ fn elements_meet_at_every_break_of_the_belt() {
     let length = 0.1 + 0.2 + 0.7;
     scenario.belt.segments = [0.1, 0.2, 0.7].map(SegmentSpec::straight).to_vec();
     scenario.loads.points = vec![PointLoad {
-        // The joint of the second and the third segment, by another sum.
+        // The arc length is the joint of the second and the third segment, by another sum.
         at: Place::ArcLength(0.3),
         force: [0.0; 3],
         lever: [0.0; 3],
@@ -1616,7 +1620,7 @@ fn a_long_word_is_cut_in_the_message() {
 
 #[test]
 fn a_million_segments_and_supports_are_checked_in_linear_time() {
-    // A quadratic check would not come back within a day.
+    // A quadratic check would take longer than a day.
     let million = 1_000_000;
     let mut scenario = base();
     scenario.belt.segments = vec![SegmentSpec::straight(1e-6); million];
@@ -1669,7 +1673,7 @@ fn any_valid_text() -> impl Strategy<Value = String> {
     prop::sample::select(texts)
 }
 
-/// One replacement of a stretch of bytes: where (as a fraction), how many, by what.
+/// One replacement of a stretch of bytes: place (as a fraction), length, new bytes.
 fn any_edit() -> impl Strategy<Value = (f64, usize, Vec<u8>)> {
     let pieces = [
         "nan",
@@ -1775,7 +1779,7 @@ proptest! {
 }
 
 #[test]
-fn the_sources_own_method_knows_plain_belts_between_two_clamps() {
+fn the_sources_own_method_takes_plain_belts_between_two_clamps() {
     let ritz = edited("\"intrinsic\"", "\"ritz\"");
     assert!(Scenario::from_toml(&ritz).is_ok());
     let two = format!("{HALF}, {HALF}");
@@ -1842,7 +1846,7 @@ fn the_sources_own_method_knows_plain_belts_between_two_clamps() {
 }
 
 #[test]
-fn numbers_beyond_all_measure_are_refused() {
+fn numbers_of_extreme_magnitude_are_refused() {
     assert_refusals(&[
         (
             RIGIDITY,

@@ -1,4 +1,4 @@
-//! Fields that may be of more than one type, read so that an error says what was found and what is allowed.
+//! Fields of more than one possible type, read so that an error reports the value found and the types allowed.
 
 use crate::scenario::{Component, Place, Rigidity, RigidityTable, SegmentSpec};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
@@ -195,8 +195,8 @@ impl SegmentKind {
     }
 }
 
-/// The fields of a segment of any kind. Serde's own reading of a tagged enum loses the path of a field at fault, and
-/// which fields are allowed is known only once the kind is.
+/// The fields of a segment of any kind. Serde's own reading of a tagged enum loses the path of a field at fault, and the
+/// allowed fields are known only once the kind is known.
 #[derive(Default)]
 struct SegmentFields {
     kind: Option<SegmentKind>,

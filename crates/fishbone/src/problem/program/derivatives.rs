@@ -1,4 +1,4 @@
-//! The programme as the solver asks for it: values and derivatives.
+//! The programme's values and derivatives, for the solver.
 
 use super::{BeltPoint, BeltProgram, DeadForce, Piece, ROWS, add_wrench, rows_of, slopes_of};
 use crate::geometry::{Pose, Twist, hat};
@@ -15,12 +15,12 @@ impl<D: Density<F>, const F: usize, const N: usize> Program<6, F, N> for BeltPro
             Piece::Strip(element) => element.length,
             Piece::Rigid { .. } | Piece::Joint { .. } => 0.0,
         };
-        let bounds = |piece: &Piece| match piece {
-            Piece::Strip(element) => element.strips().bounds().count(),
+        let bounds = |(k, piece): (usize, &Piece)| match piece {
+            Piece::Strip(element) => self.bounds(k, element).places().count(),
             Piece::Rigid { .. } | Piece::Joint { .. } => 0,
         };
         let layout = Layout::new(self.pieces.iter().map(weight).collect())
-            .with_stage_inequalities(self.pieces.iter().map(bounds));
+            .with_stage_inequalities(self.pieces.iter().enumerate().map(bounds));
         let supports = self.supports.iter();
         let layout = supports.fold(layout, |layout, support| {
             layout.with_equalities_at(support.node, ROWS)
@@ -38,11 +38,10 @@ impl<D: Density<F>, const F: usize, const N: usize> Program<6, F, N> for BeltPro
     fn evaluate(&self, point: &mut BeltPoint<F>, values: &mut Values) -> bool {
         values.slacks.clear();
         for (k, element) in self.elements() {
-            let strips = element.strips();
-            let slacks = strips.slacks(slopes_of(&point.fields, k));
-            let [plus, minus, further @ ..] = slacks;
+            let bounds = self.bounds(k, element);
+            let [plus, minus, active @ ..] = bounds.slacks(slopes_of(&point.fields, k));
             values.slacks.extend([plus, minus]);
-            for (slack, edge) in further.into_iter().zip(&strips.further) {
+            for (slack, edge) in active.into_iter().zip(bounds.edges) {
                 if edge.is_some() {
                     values.slacks.push(slack);
                 }
@@ -127,8 +126,8 @@ impl<D: Density<F>, const F: usize, const N: usize> Program<6, F, N> for BeltPro
         into.poses[0] = Pose::exp(&twist) * point.poses[0];
     }
 
-    /// The mean square over the board of how far it moves, in U², all of it weighing alike: a node carries half of both
-    /// pieces beside it, as a strip across the spine that turns with the frame.
+    /// The mean square displacement of the board, in U², of uniform weight: a node carries half of both pieces beside it, as
+    /// a strip across the spine that turns with the frame.
     fn metric(&self, point: &BeltPoint<F>) -> Vec<Matrix6<f64>> {
         let half_width = self.elements().map(|(_, element)| element.half_width);
         let across = half_width.fold(0.0, f64::max).powi(2) / 3.0;
@@ -193,26 +192,27 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         }
     }
 
-    /// Gradients of the bounds of an element's ribs; takes their second derivatives off those by its fields.
+    /// Gradients of the bounds of an element's ribs; subtracts their second derivatives from the Hessian by the element's
+    /// fields.
     fn linearise_bounds(
         &self,
         k: usize,
         element: &Element,
         point: &BeltPoint<F>,
-        bounds: &[f64],
+        multipliers: &[f64],
         controls: &mut StageMatrix<F>,
         into: &mut Linearisation<6, F, N>,
     ) {
-        let strips = element.strips();
-        let slacks = strips.slack_jets(slopes_of(&point.fields, k));
-        let is_linear = strips.has_linear_bounds();
+        let bounds = self.bounds(k, element);
+        let slacks = bounds.slack_jets(slopes_of(&point.fields, k));
+        let are_linear = bounds.are_linear();
         let rows = into.layout().stage_rows(k);
-        for (row, bound) in rows.zip(strips.bounds()) {
-            let slack = &slacks[bound];
-            if !is_linear {
-                controls.first[(1, 1)] -= bounds[row] * slack.hessian[(0, 0)];
-                controls.mixed[(1, 1)] -= bounds[row] * slack.hessian[(0, 1)];
-                controls.second[(1, 1)] -= bounds[row] * slack.hessian[(1, 1)];
+        for (row, place) in rows.zip(bounds.places()) {
+            let slack = &slacks[place];
+            if !are_linear {
+                controls.first[(1, 1)] -= multipliers[row] * slack.hessian[(0, 0)];
+                controls.mixed[(1, 1)] -= multipliers[row] * slack.hessian[(0, 1)];
+                controls.second[(1, 1)] -= multipliers[row] * slack.hessian[(1, 1)];
             }
             let gradient = &mut into.stage_slacks[row];
             gradient[0].fill(0.0);
@@ -221,8 +221,8 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         }
     }
 
-    /// Gradients and second derivatives of the obstacles' gaps. The gradient of the programme takes on the contacts' wrench, for
-    /// the second derivatives along the chain; the contacts' own share of it is returned.
+    /// Gradients and second derivatives of the obstacles' gaps. The contacts' wrench is added to the gradient of the
+    /// programme, for the second derivatives along the chain; the contacts' own share of the gradient is returned.
     fn linearise_obstacles(
         &self,
         point: &BeltPoint<F>,
@@ -257,7 +257,7 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         contacts
     }
 
-    /// Takes the first-order part of the contacts off the gradient again: the solver adds it itself.
+    /// Subtracts the first-order part of the contacts from the gradient again: the solver adds it itself.
     fn leave_out(&self, mut contacts: Vec<NodeVector<N>>, into: &mut Linearisation<6, F, N>) {
         into.chain.carry_back(&mut contacts);
         for (gradient, contact) in into.gradient.iter_mut().zip(&contacts) {
@@ -265,7 +265,7 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         }
     }
 
-    /// How the slope is carried on across a joint, and what that bends of all that depends on it.
+    /// The slope carried on across a joint: its derivative, and the second derivative that it adds.
     fn linearise_tie(
         &self,
         k: usize,
@@ -276,19 +276,19 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         let Some([_, first, second]) = self.carried_slope(point, k + 1) else {
             return;
         };
-        let mut pull = into.gradient[k + 1][7];
+        let mut generalised_force = into.gradient[k + 1][7];
         if k + 1 < self.pieces.len() {
             for row in into.layout().stage_rows(k + 1) {
-                pull -= bounds[row] * into.stage_slacks[row][0][1];
+                generalised_force -= bounds[row] * into.stage_slacks[row][0][1];
             }
         }
         into.chain.stages[k].tie = [0.0; F];
         into.chain.stages[k].tie[1] = first;
         into.diagonal.controls[k] = StageMatrix::zeros();
-        into.diagonal.controls[k].first[(1, 1)] = second * pull;
+        into.diagonal.controls[k].first[(1, 1)] = second * generalised_force;
     }
 
-    /// Derivatives of supports, links and loads at their nodes, second ones by their states.
+    /// Derivatives of supports, links and loads at their nodes; second derivatives by the nodes' states.
     fn linearise_conditions(
         &self,
         point: &BeltPoint<F>,

@@ -1,4 +1,4 @@
-//! What ties two nodes together: the distance between them, Eq. (35), and the seam of a closed belt.
+//! Ties between two nodes: an offset of their positions, Eq. (35), and the seam of a closed belt.
 
 use super::support::RotationGap;
 use super::{BeltPoint, ROWS, Rows};
@@ -10,18 +10,18 @@ use nalgebra::{Matrix6, SMatrix, UnitQuaternion, Vector3};
 pub struct NodeLink {
     /// The two nodes.
     pub nodes: [usize; 2],
-    /// What of the second follows from the first.
+    /// State of the second node that follows from the first.
     pub tie: Tie,
 }
 
-/// What of one node follows from another.
+/// State of one node that follows from another.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Tie {
-    /// Its position, at a fixed offset in world axes, Eq. (35).
+    /// Position, at a fixed offset in world axes, Eq. (35).
     Offset(Vector3<f64>),
-    /// Its pose: the same position, the frame turned by a rotation in body axes.
+    /// Pose: the same position, the frame turned by a rotation in body axes.
     Pose(UnitQuaternion<f64>),
-    /// Bend and rib slope, by a factor, each or not.
+    /// Bend and rib slope, each by a factor; `None` where it does not follow.
     Fields([Option<f64>; 2]),
 }
 
@@ -81,7 +81,8 @@ impl NodeLink {
 
     /// Second derivatives of `multipliers · values` by the twists of both nodes.
     ///
-    /// Those of a frame tied to another are left out: where the tie is met they vanish in all directions that keep it.
+    /// Second derivatives of a frame tied to another are left out: where the tie is met they vanish in all directions that
+    /// keep it.
     pub(super) fn hessians<const F: usize>(
         &self,
         point: &BeltPoint<F>,

@@ -8,31 +8,32 @@ use nalgebra::{Matrix6, Vector3, Vector6};
 pub struct DeadForce {
     /// Force, world axes.
     pub force: Vector3<f64>,
-    /// From the node to where the force acts, body axes.
+    /// Lever from the node to the point of the force, body axes.
     pub lever: Vector3<f64>,
 }
 
 /// A dead force and the node that it acts on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NodeLoad {
-    /// Which node.
+    /// Index of the node.
     pub node: usize,
-    /// What acts on it.
+    /// The dead force.
     pub load: DeadForce,
 }
 
 impl DeadForce {
-    /// Its potential −F · (x + R l).
-    pub fn potential(&self, pose: &Pose) -> f64 {
+    /// Potential −F · (x + R l) of the force.
+    pub(crate) fn potential(&self, pose: &Pose) -> f64 {
         -self.force.dot(&pose.transform(&self.lever))
     }
 
-    /// Derivative of the potential by a twist of the belt from the node on: the wrench about the origin, world axes.
-    pub(super) fn pull(&self, pose: &Pose) -> Vector6<f64> {
+    /// Generalised force by a twist of the belt from the node on, as the gradient of the potential: a wrench about the
+    /// origin, world axes.
+    pub(super) fn generalised_force(&self, pose: &Pose) -> Vector6<f64> {
         carried_gradient(&pose.transform(&self.lever), &-self.force)
     }
 
-    /// Second derivative by the twist.
+    /// Second derivative of the potential by the twist.
     pub(super) fn hessian(&self, pose: &Pose) -> Matrix6<f64> {
         carried_hessian(&pose.transform(&self.lever), &-self.force)
     }
@@ -69,7 +70,7 @@ mod tests {
         for i in 0..6 {
             let e_i = h * Vector6::ith(i, 1.0);
             let difference = (moved(e_i) - moved(-e_i)) / (2.0 * h);
-            assert!((difference - load.pull(&at)[i]).abs() < 1e-7);
+            assert!((difference - load.generalised_force(&at)[i]).abs() < 1e-7);
             for j in 0..6 {
                 let e_j = h * Vector6::ith(j, 1.0);
                 let difference = (moved(e_i + e_j) - moved(e_i - e_j) - moved(e_j - e_i)

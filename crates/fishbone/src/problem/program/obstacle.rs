@@ -20,7 +20,7 @@ pub trait Obstacle: Debug + Send + Sync {
 /// An obstacle that a node must not enter.
 #[derive(Debug, Clone)]
 pub struct NodeObstacle {
-    /// Which node.
+    /// Index of the node.
     pub node: usize,
     /// The obstacle.
     pub obstacle: Arc<dyn Obstacle>,
@@ -29,7 +29,7 @@ pub struct NodeObstacle {
 }
 
 impl PartialEq for NodeObstacle {
-    /// The same node before the same obstacle.
+    /// Equality of the node, the obstacle (by identity) and the weight.
     fn eq(&self, other: &Self) -> bool {
         self.node == other.node
             && self.weight == other.weight
@@ -38,7 +38,7 @@ impl PartialEq for NodeObstacle {
 }
 
 impl NodeObstacle {
-    /// Force of the contact on the belt, world axes, of which the multiplier is given.
+    /// Force of the contact on the belt, world axes, from its multiplier.
     pub fn force(&self, pose: &Pose, multiplier: f64) -> Vector3<f64> {
         multiplier * self.obstacle.gradient(&pose.position)
     }
@@ -52,7 +52,7 @@ impl NodeObstacle {
         carried_gradient(&pose.position, &self.obstacle.gradient(&pose.position))
     }
 
-    /// Its second derivative.
+    /// Second derivative of the gap by the node's twist.
     pub(super) fn hessian(&self, pose: &Pose) -> Matrix6<f64> {
         let point = &pose.position;
         let curved = self.obstacle.hessian(point);

@@ -1,15 +1,11 @@
-//! What joins a node of the spine to the next.
+//! Pieces of the belt between a node of the spine and the next.
 
 use crate::geometry::Pose;
 use crate::strip::element::Element;
 use crate::strip::spine::turn;
 use nalgebra::Vector3;
 
-/// What joins a node to the next.
-#[expect(
-    clippy::large_enum_variant,
-    reason = "nearly all pieces are strips, read one after the other"
-)]
+/// A piece of the belt between a node and the next.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Piece {
     /// A flexible element.
@@ -28,7 +24,7 @@ pub enum Piece {
 
 impl Piece {
     /// Length along the spine.
-    pub fn length(&self) -> f64 {
+    pub(crate) fn length(&self) -> f64 {
         match self {
             Self::Strip(element) => element.length,
             Self::Rigid { length } => *length,
@@ -36,7 +32,7 @@ impl Piece {
         }
     }
 
-    /// The motion along it, where that does not depend on the shape.
+    /// The motion along a piece, where it does not depend on the shape.
     pub(super) fn fixed_motion(&self) -> Option<Pose> {
         match self {
             Self::Strip(_) => None,

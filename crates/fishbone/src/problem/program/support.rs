@@ -1,28 +1,28 @@
-//! What holds a node: positions, frames, hinges, Eq. (35), (36).
+//! Supports of a node: positions, frames, hinges, Eq. (35), (36).
 
 use super::Rows;
 use crate::geometry::{Pose, carried_hessian, hat};
 use nalgebra::{Matrix3, Matrix6, Rotation3, UnitQuaternion, Vector3};
 
-/// What of a node's frame is prescribed.
+/// The prescribed part of a node's frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Hold {
     /// Nothing.
     Free,
-    /// All of it.
+    /// The whole frame.
     Frame(UnitQuaternion<f64>),
-    /// All but the turn about one of its own axes.
+    /// The frame but for a turn about one of its own axes.
     Hinge {
-        /// The frame that the node's is a turn away from.
+        /// The prescribed frame, from which the node's may be turned about `axis`.
         frame: UnitQuaternion<f64>,
-        /// Which body axis: 0, 1, 2 for ξ, η, ζ.
+        /// Body axis: 0, 1, 2 for ξ, η, ζ.
         axis: usize,
     },
 }
 
 impl Hold {
     /// The prescribed frame, free to turn about an axis or not.
-    pub fn frame(&self) -> Option<UnitQuaternion<f64>> {
+    pub(crate) fn frame(&self) -> Option<UnitQuaternion<f64>> {
         match self {
             Self::Free => None,
             Self::Frame(frame) | Self::Hinge { frame, .. } => Some(*frame),
@@ -33,21 +33,22 @@ impl Hold {
 /// Conditions at one node.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NodeSupport {
-    /// Which node.
+    /// Index of the node.
     pub node: usize,
     /// Prescribed position, Eq. (35), each component or none.
     pub position: [Option<f64>; 3],
     /// Prescribed frame, Eq. (36).
     pub hold: Hold,
-    /// Whether the rib is square there, β = 0.
+    /// Whether the rib at the node is square, β = 0.
     pub square_rib: bool,
 }
 
 /// The rotation from the prescribed frame to the present one as modified Rodrigues parameters `4 tan(θ/4) axis`, with
 /// derivatives by the body rotation.
 ///
-/// Like the rotation vector near zero, and zero at no other rotation. Unlike the rotation vector and the skew part of
-/// the matrix they have regular derivatives up to and at a half-turn, where the shorter of the two turns changes side.
+/// These parameters equal the rotation vector to first order near zero, and are zero at no other rotation. Unlike the
+/// rotation vector and the skew part of the matrix they have regular derivatives up to and at a half-turn, where the shorter
+/// of the two turns changes side.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct RotationGap {
     scalar: f64,
@@ -58,7 +59,8 @@ impl RotationGap {
     pub(super) fn new(prescribed: &UnitQuaternion<f64>, frame: &Matrix3<f64>) -> Self {
         let now = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(*frame));
         let gap = prescribed.conjugate() * now;
-        // At a half-turn rounding must not choose between its two sides.
+        /// Scalar part of the unit quaternion below which the turn counts as a half-turn, dimensionless: rounding must not
+        /// choose between its two sides.
         const HALF_TURN: f64 = 1e-9;
         let decisive = match gap.w.abs() > HALF_TURN {
             true => gap.w,
@@ -96,16 +98,16 @@ impl RotationGap {
     }
 }
 
-/// The prescribed axis of a hinge and the present one: stereographic coordinates of the present one, seen from the
-/// prescribed frame, about the prescribed one.
+/// The gap between the prescribed axis of a hinge and the present axis: stereographic coordinates of the present axis, in
+/// the prescribed frame, about the prescribed axis.
 ///
-/// Zero where the axes agree and nowhere else; regular unless they oppose each other.
+/// The gap is zero where the axes agree and nowhere else, and regular unless they oppose each other.
 #[derive(Debug, Clone, Copy)]
 struct AxisGap {
     axis: usize,
-    /// The present body axis by the prescribed frame.
+    /// The present body axis in the prescribed frame.
     seen: Vector3<f64>,
-    /// From body axes to those of the prescribed frame.
+    /// Rotation from body axes to the prescribed frame's axes.
     to_prescribed: Matrix3<f64>,
 }
 
@@ -174,7 +176,7 @@ impl AxisGap {
     }
 }
 
-/// How far the present frame is from what is prescribed of it.
+/// The gap between the present frame and the prescribed part of it.
 enum Gap {
     None,
     Rotation(RotationGap),
@@ -207,22 +209,22 @@ impl Gap {
     }
 }
 
-/// How a support's conditions on a frame answer to turns of it, left and in world axes.
+/// Derivatives of a support's conditions on a frame by turns of the frame, from the left and in world axes.
 ///
-/// They depend on how the frame is turned from the prescribed one and on nothing else.
+/// They depend only on the rotation from the prescribed frame to the present frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Turn {
     /// Derivative of the conditions.
     pub(crate) jacobian: Matrix3<f64>,
-    /// Derivative of multipliers times conditions.
-    pub(crate) pull: Vector3<f64>,
-    /// Its second derivative along single turns.
+    /// Generalised force: the derivative of multipliers times conditions.
+    pub(crate) generalised_force: Vector3<f64>,
+    /// Second derivative of multipliers times conditions along single turns.
     pub(crate) hessian: Matrix3<f64>,
 }
 
 impl NodeSupport {
-    /// The prescribed position, where all of it is.
-    pub fn point(&self) -> Option<Vector3<f64>> {
+    /// The prescribed position; `None` where a component is free.
+    pub(crate) fn point(&self) -> Option<Vector3<f64>> {
         let [x, y, z] = self.position;
         Some(Vector3::new(x?, y?, z?))
     }
@@ -287,23 +289,23 @@ impl NodeSupport {
         components.filter_map(|(i, held)| Some((i, held?)))
     }
 
-    /// How the frame's conditions answer to turns.
+    /// Derivatives of the frame's conditions by turns.
     pub(crate) fn turn(&self, pose: &Pose, multipliers: &Rows) -> Turn {
         let gap = self.gap(pose);
         let weights = multipliers.fixed_rows::<3>(3).into_owned();
         let jacobian = gap.jacobian() * pose.frame.transpose();
         Turn {
             jacobian,
-            pull: jacobian.tr_mul(&weights),
+            generalised_force: jacobian.tr_mul(&weights),
             hessian: pose.frame * gap.hessian(&weights) * pose.frame.transpose(),
         }
     }
 
     /// Force and moment of the support on the belt about its point, world axes.
     pub(crate) fn reaction(&self, pose: &Pose, multipliers: &Rows) -> (Vector3<f64>, Vector3<f64>) {
-        let pull = self.jacobian(pose).tr_mul(multipliers);
-        let force: Vector3<f64> = pull.fixed_rows::<3>(0).into_owned();
-        let moment = pull.fixed_rows::<3>(3) - pose.position.cross(&force);
+        let generalised_force = self.jacobian(pose).tr_mul(multipliers);
+        let force: Vector3<f64> = generalised_force.fixed_rows::<3>(0).into_owned();
+        let moment = generalised_force.fixed_rows::<3>(3) - pose.position.cross(&force);
         (-force, -moment)
     }
 }

@@ -1,6 +1,6 @@
 use super::*;
-use crate::strip::developable::Curl;
-use crate::strip::ribs::Edge;
+use crate::strip::bounds::Edge;
+use crate::strip::element::Curl;
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, SymmetricEigen, Vector2};
 use stagewise::{Linearisation, Multipliers, Program, Stationary, Values, lowest_modes};
 use std::sync::Arc;
@@ -17,17 +17,19 @@ fn element(length: f64, geodesic: f64) -> Piece {
             bend: 0.8,
             poisson: 0.3,
         },
-        further: [
-            None,
-            Some(Edge::line(Vector2::new(0.8, 0.6), 0.03)),
-            Some(Edge {
-                direction: Vector2::x(),
-                distance: 0.05,
-                curvature: 4.0,
-                turn: [-0.5, 0.4],
-            }),
-        ],
     })
+}
+
+/// A line and an arc.
+fn edges() -> ActiveEdges {
+    let arc = Edge {
+        direction: Vector2::x(),
+        distance: 0.05,
+        curvature: 4.0,
+        turn: [-0.5, 0.4],
+    };
+    let line = Edge::line(Vector2::new(0.8, 0.6), 0.03);
+    [None, Some(line), Some(arc)]
 }
 
 /// A ball that nodes must not enter.
@@ -52,8 +54,8 @@ impl Obstacle for Ball {
     }
 }
 
-/// A belt with one of everything: a straight stretch, a bend, an arc, a stiffener, a joint, a hinge, a link, weight,
-/// a dead force with a lever, an obstacle before two nodes.
+/// A belt with every kind of part: a straight stretch, a bend, an arc, a stiffener, a joint, a hinge, a link, weight, a dead
+/// force with a lever, an obstacle before two nodes.
 fn program() -> BeltProgram {
     let pieces = vec![
         element(0.2, 0.0),
@@ -92,6 +94,10 @@ fn program() -> BeltProgram {
         },
     ];
     let mut program = BeltProgram::new(pieces, EnergyModel::Wunderlich).with_supports(supports);
+    let strips: Vec<usize> = program.elements().map(|(k, _)| k).collect();
+    for k in strips {
+        program.edges[k] = edges();
+    }
     program.links = vec![
         NodeLink {
             nodes: [1, 8],
@@ -138,7 +144,7 @@ fn point(program: &BeltProgram) -> BeltPoint {
     point
 }
 
-/// What the solver's linearisation is the second-order expansion of.
+/// The Lagrangian, of which the solver's linearisation is the second-order expansion.
 fn lagrangian(program: &BeltProgram, point: &mut BeltPoint, multipliers: &Multipliers) -> f64 {
     let mut values = Values::default();
     assert!(program.evaluate(point, &mut values));
@@ -237,9 +243,7 @@ fn test_gradient_and_hessian_agree_with_finite_differences() {
                 + value(&[(a.0, a.1, -h), (b.0, b.1, -h)]))
                 / (4.0 * h * h);
             let (along_a, along_b) = (unit(&linear, *a), unit(&linear, *b));
-            let exact = linear
-                .chain
-                .second_derivative(&linear.diagonal, &along_a, &along_b);
+            let exact = linear.second_derivative(&along_a, &along_b);
             assert!(
                 (second - exact).abs() < 2e-5 * exact.abs().max(10.0),
                 "{a:?} {b:?} {second} {exact}"
@@ -269,9 +273,7 @@ fn dense_modes(program: &BeltProgram, at: &Stationary<BeltPoint>) -> Vec<f64> {
         rates.sum::<f64>()
     };
     let second = square(&|i, j| {
-        let own = linear
-            .chain
-            .second_derivative(&linear.diagonal, &steps[i], &steps[j]);
+        let own = linear.second_derivative(&steps[i], &steps[j]);
         let stages = 0..layout.stages();
         let rows = stages.flat_map(|k| layout.stage_rows(k).map(move |row| (k, row)));
         let touched = linear.node_slacks.iter().zip(layout.inequalities_at());
@@ -325,7 +327,7 @@ fn dense_modes(program: &BeltProgram, at: &Stationary<BeltPoint>) -> Vec<f64> {
 
 #[test]
 fn test_lowest_modes_are_those_of_dense_matrices() {
-    // Without the clamp at the end, so that the constraints leave it free to move.
+    // Left out is the clamp at the end, so that the belt is free to move under its constraints.
     let whole = program();
     let supports = whole.supports[..2].to_vec();
     let program = whole.with_supports(supports);

@@ -1,4 +1,4 @@
-//! What the board must satisfy: its segments and what they are made of.
+//! Conditions on the board: its segments and their materials.
 
 use super::super::{
     BeltSpec, LayerSpec, MaterialSpec, Rigidity, RigidityTable, SAME_PLACE, SegmentSpec,
@@ -13,14 +13,17 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, TAU};
 use std::fmt::Arguments;
 use std::ops::RangeInclusive;
 
-/// Ribs of a board bent more sharply than this at one point leave no room for each other.
+/// Greatest angle of a bend of the board at one point, in rad: beyond it ribs have no room beside each other.
 const SHARPEST: f64 = 2.0 * FRAC_PI_3;
-/// An angle of four decimals may exceed [`SHARPEST`] by this.
+/// Tolerance of [`SHARPEST`] for angles of four decimals, in rad.
 const ANGLE_TOLERANCE: f64 = 1e-4;
-/// More full turns than this of a flat or an unloaded board ask for more elements than there may be.
+/// Greatest turn of a flat or an unloaded board, in full turns: more of them need more elements than are allowed.
 const MOST_TURNS: f64 = 1000.0;
+/// Half turns of a closed belt, a number.
 const HALF_TURNS: RangeInclusive<i32> = -20..=20;
+/// Greatest count of layers, a number.
 const MOST_LAYERS: usize = 1000;
+/// Greatest count of a table's entries, a number.
 const MOST_ENTRIES: usize = 10_000;
 
 impl BeltSpec {
@@ -85,7 +88,7 @@ impl BeltSpec {
         Ok(())
     }
 
-    /// Corners in a row bend the board at one point.
+    /// Checks corners in a row together: they bend the board at one point.
     fn check_corners(&self) -> Check {
         let is_corner = |segment: &SegmentSpec| matches!(segment, SegmentSpec::Corner { .. });
         let mut next = 0;
@@ -196,7 +199,7 @@ impl BeltSpec {
         })
     }
 
-    /// Rigidity and mass that follow from a material or layers.
+    /// Checks the rigidity and mass that follow from a material or layers.
     fn check_derived(&self, field: Arguments) -> Check {
         let rigidity = self.own_rigidity().unwrap_or_default();
         require(MAGNITUDES.contains(&rigidity), field, || {
@@ -312,7 +315,7 @@ impl RigidityTable {
     }
 }
 
-/// Completes "must be …".
+/// Words for [`SHARPEST`] that complete "must be …", in rad and degrees.
 const SHARPEST_ALLOWED: &str = "at most 2π/3 (120°) in magnitude";
 
 fn is_open(angle: f64) -> bool {
@@ -325,7 +328,7 @@ fn check_angle(i: usize, angle: f64) -> Check {
     require(is_open(angle), field, || (number(angle), SHARPEST_ALLOWED))
 }
 
-/// Refuses a material that is not known, with the names that are.
+/// Refuses an unknown material, with the known names.
 fn check_preset(field: Arguments, name: &str) -> Check {
     if Material::named(name).is_some() {
         return Ok(());

@@ -1,13 +1,14 @@
-//! The questions that every part of a scenario is asked, and how a refusal reads.
+//! Checks shared by all parts of a scenario, and the wording of a refusal.
 
 use crate::scenario::error::{ScenarioError, number};
 use std::fmt::{Arguments, Display};
 use std::ops::RangeInclusive;
 
-/// Lengths, rigidities and forces outside this range would overflow or vanish in what is computed from them.
+/// Magnitudes of lengths, rigidities and forces, in the scenario's units: outside this range, results would overflow or
+/// vanish.
 pub(super) const MAGNITUDES: RangeInclusive<f64> = 1e-100..=1e100;
 
-/// Positions farther away than this, in U, leave too few digits for the shape.
+/// Greatest distance of positions, in U: farther away, too few digits are left for the shape.
 const FARTHEST: f64 = 1e6;
 
 pub(super) type Check = Result<(), ScenarioError>;
@@ -29,7 +30,7 @@ pub(super) fn require<F: Display, A: Display>(
     ))
 }
 
-/// The names of what is given.
+/// The names of the given fields.
 pub(super) fn given<'a>(fields: &[(&'a str, bool)]) -> Vec<&'a str> {
     let given = fields.iter().filter(|(_, is_given)| *is_given);
     given.map(|(name, _)| *name).collect()

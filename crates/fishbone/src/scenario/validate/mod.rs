@@ -1,4 +1,4 @@
-//! What a scenario must satisfy beyond its types.
+//! Conditions on a scenario beyond its types.
 
 mod belt;
 mod check;
@@ -11,13 +11,19 @@ use nalgebra::Vector3;
 use outside::{Extent, check_links, check_supports};
 use std::ops::RangeInclusive;
 
-/// Finer tolerances are below rounding, coarser ones no equilibrium.
+/// Tolerances of the solver, lengths in U and energy in mean R_f/U: finer ones are below rounding, coarser ones give no
+/// equilibrium.
 const TOLERANCES: RangeInclusive<f64> = 1e-13..=1e-2;
 
+/// Elements of the mesh, a number.
 const ELEMENTS: RangeInclusive<usize> = 4..=100_000;
+/// Basis functions of each unknown of the Ritz method, a number.
 const RITZ_BASIS: RangeInclusive<usize> = 6..=40;
+/// Collocation points of the Ritz method, a number.
 const RITZ_POINTS: RangeInclusive<usize> = 2..=500;
+/// Penalty factors of the Ritz method, in R_f/U.
 const RITZ_PENALTIES: RangeInclusive<f64> = 1e-6..=1e12;
+/// Multiplier updates of the Ritz method, a number.
 const RITZ_UPDATES: RangeInclusive<usize> = 0..=1000;
 
 impl Scenario {
@@ -40,7 +46,7 @@ impl Scenario {
         }
     }
 
-    /// Checks what a support of a valid scenario is to be replaced by, at the same place along the belt.
+    /// Checks the replacement for a support of a valid scenario, at the same place along the belt.
     ///
     /// Errors: the first thing wrong, with its field.
     pub(crate) fn check_support(&self, i: usize, support: &SupportSpec) -> Check {
@@ -76,7 +82,7 @@ impl Scenario {
         })
     }
 
-    /// The source's own method knows straight belts with a connector at either end and no others.
+    /// Checks the limits of the source's own method: straight belts with a connector at either end.
     fn check_ritz(&self, length: f64) -> Check {
         let refused = [
             (

@@ -1,4 +1,4 @@
-//! What supports, links and loads must satisfy: what acts on the board from outside.
+//! Conditions on supports, links and loads, which act on the board from outside.
 
 use super::super::{LinkSpec, LoadsSpec, Place, SAME_PLACE, SupportSpec};
 use super::check::{
@@ -8,22 +8,25 @@ use crate::scenario::error::number;
 use nalgebra::Vector4;
 use std::fmt::Arguments;
 
-/// How far the norm of a quaternion may be off 1.
+/// Tolerance of a quaternion's norm against 1, dimensionless.
 const QUATERNION_TOLERANCE: f64 = 1e-6;
-/// Rotations by more than this, in rad, leave too few digits for the direction.
+/// Greatest angle of a rotation, in rad: beyond it, too few digits are left for the direction.
 const LARGEST_ANGLE: f64 = 1e6;
-/// Links couple all that lies between their ends; the work grows with the square of their number.
+/// Greatest count of links, a number: they couple all nodes between their ends, and the work grows with the square of the
+/// count.
 const MOST_LINKS: usize = 100;
+/// Greatest count of point loads, a number.
 const MOST_LOADS: usize = 10_000;
 
+/// Words for the fields of an orientation, which complete "must be …".
 const ORIENTATIONS: &str = "one of rotation, euler, quaternion";
 
-/// What a place along the spine is checked against.
+/// The extent of the belt, against which places along the spine are checked.
 #[derive(Clone, Copy)]
 pub(super) struct Extent {
     /// Length U.
     pub(super) length: f64,
-    /// Whether the end is the start.
+    /// Whether the belt is closed.
     pub(super) closed: bool,
 }
 
@@ -134,7 +137,7 @@ impl LinkSpec {
 }
 
 impl LoadsSpec {
-    /// Mass per length decides whether gravity acts at all.
+    /// Checks the loads; gravity acts only on a belt with mass.
     pub(super) fn check(&self, extent: Extent) -> Check {
         let gravity = self.gravity.unwrap_or_default();
         bounded_vector(format_args!("loads.gravity"), &gravity)?;
@@ -152,7 +155,7 @@ impl LoadsSpec {
         Ok(())
     }
 
-    /// Whether nothing pulls.
+    /// Whether there is no gravity and no force.
     pub(super) fn is_empty(&self) -> bool {
         self.points.is_empty() && self.gravity.unwrap_or_default() == [0.0; 3]
     }
@@ -175,7 +178,7 @@ fn check_order(i: usize, [before, this]: [&Place; 2], length: f64) -> Check {
     })
 }
 
-/// A place along the spine by its number, and by its name where it has one.
+/// A place along the spine as printed: its arc length, and its name where it has one.
 fn place(u: f64, length: f64) -> String {
     let named = [(0.0, " (start)"), (length, " (end)")]
         .into_iter()

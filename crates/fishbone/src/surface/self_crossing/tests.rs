@@ -6,9 +6,10 @@ use approx::assert_relative_eq;
 use proptest::prelude::*;
 use std::f64::consts::{PI, TAU};
 
+/// Width of the test belts, in the unit of their length.
 const WIDTH: f64 = 0.1;
 
-/// Half the angle between the tangents of a figure-eight of sinusoidal direction where it crosses itself: J₀ = 0.
+/// Amplitude of the sinusoidal direction of a closed figure-eight, the first root of J₀, in rad.
 const EIGHT: f64 = 2.404_825_557_695_773;
 
 /// A belt on the cylinder over a figure-eight of one length, from a place of it on; it crosses itself at ¼ and ¾.
@@ -58,7 +59,7 @@ fn test_figure_eight_crosses_itself_at_its_inflections() {
 
 #[test]
 fn test_figure_eight_that_climbs_by_its_width_between_passes_is_clear() {
-    // ½ sin α between passes, of which each takes V/cos α along the axis.
+    // The belt climbs ½ sin α between passes, and each pass takes V/cos α along the axis.
     let least = 0.5 * (4.0 * WIDTH).asin();
     for sign in [1.0, -1.0] {
         for share in [0.5, 0.99] {
@@ -75,7 +76,7 @@ fn test_figure_eight_that_climbs_by_its_width_between_passes_is_clear() {
 
 #[test]
 fn test_end_that_rests_against_the_belt_does_not_cross_it() {
-    // From the crossing round both loops to the crossing: the ends rest on the middle.
+    // The belt goes from the crossing round both loops to the crossing: its ends rest on its middle.
     for slip in [0.0, 1e-7, 1e-6] {
         let resting = eight(10_000, 0.25 - slip, 1.0 + 2.0 * slip, 0.0);
         assert_eq!(crosses_itself(&resting), None);
@@ -94,7 +95,7 @@ fn test_crossing_on_the_seam_of_a_closed_belt_is_found() {
 
 #[test]
 fn test_legs_of_a_loop_cross_where_their_lines_do() {
-    // Half a turn and more, and less than a whole one; the legs meet tan(½ turn) radii beyond the arc.
+    // The arc turns by more than half a turn and less than a whole one; the legs meet tan(½ turn) radii beyond the arc.
     for turn in [3.6f64, 5.0, 6.0] {
         let [a, b] = crosses_itself(&loop_of(turn, 800)).expect("a crossing");
         let beyond = 0.04 * (0.5 * turn - (0.5 * turn).tan());
@@ -119,13 +120,13 @@ fn test_layers_of_a_wound_belt_lie_on_each_other_and_do_not_cross() {
 
 #[test]
 fn test_layers_of_an_oval_winding_that_turns_cross_and_a_steep_one_is_clear() {
-    // Ovals whose long axis turns from one winding to the next, on a helix.
+    // The windings are ovals on a helix, with a long axis that turns from one winding to the next.
     let winding = |rib_angle: f64| {
         let around = TAU * 3.0;
         let bend = move |u: f64| around * rib_angle.cos() * (1.0 + 0.5 * (1.9 * around * u).cos());
         spine(1.0, 0.02, 300, bend, |_| rib_angle.tan())
     };
-    // A third of sin α between windings, of which each takes V/cos α along the axis.
+    // The belt climbs a third of sin α between windings, and each winding takes V/cos α along the axis.
     assert!(crosses_itself(&winding(0.0)).is_some());
     assert!(crosses_itself(&winding(0.03)).is_some());
     assert_eq!(crosses_itself(&winding(0.1)), None);
@@ -140,8 +141,9 @@ fn test_spiral_crosses_nothing() {
 }
 
 #[test]
-fn test_sheets_that_cross_at_less_than_an_element_turns_are_divided_until_it_shows() {
-    // Two rounds of a ring whose bend waves once a round: each is the other turned over, and they meet a quarter on.
+fn test_sheets_that_cross_at_less_than_an_element_turns_are_divided_until_the_crossing_is_clear() {
+    // The belt is two rounds of a ring whose bend waves once a round: each round is the other turned over, and they meet a
+    // quarter on.
     for (wave, levels_in_doubt) in [(0.05, 1), (0.01, 2)] {
         let bend = |u: f64| 2.0 * TAU * (1.0 + wave * (2.0 * TAU * u).sin());
         let belt = spine(1.0, WIDTH, 80, bend, |_| 0.0);
@@ -170,7 +172,7 @@ fn test_closed_rings_do_not_cross_at_their_seam() {
 
 #[test]
 fn test_moebius_band_does_not_cross_itself() {
-    // That of scenarios/mobius.toml.
+    // The band is that of scenarios/mobius.toml.
     let segments = vec![crate::scenario::SegmentSpec::straight(TAU)];
     let mut belt = crate::scenario::BeltSpec::new(TAU / 30.0, TAU / 30.0, segments);
     (belt.closed, belt.half_turns) = (true, Some(1));
@@ -181,7 +183,7 @@ fn test_moebius_band_does_not_cross_itself() {
 }
 
 #[test]
-fn test_flat_belts_and_belts_that_are_not_there_cross_nothing() {
+fn test_flat_belts_and_empty_belts_cross_nothing() {
     assert_eq!(crosses_itself(&spine(1.0, WIDTH, 9, |_| 0.0, |u| u)), None);
     assert_eq!(crosses_itself(&spine(0.0, WIDTH, 0, |_| 1.0, |u| u)), None);
     assert_eq!(crosses_itself(&spine(0.0, WIDTH, 3, |_| 1.0, |u| u)), None);
@@ -197,7 +199,8 @@ fn test_flat_belts_and_belts_that_are_not_there_cross_nothing() {
 
 #[test]
 fn test_boards_that_turn_in_their_plane_cross_without_bending_by_half_a_turn() {
-    // More than a round of an arc in its plane, one end tilted; and a triangle whose last leg passes through its first.
+    // The boards: more than a round of an arc in its plane, one end tilted; and a triangle whose last leg passes through its
+    // first.
     let u: Vec<f64> = (0..=160).map(|i| f64::from(i) / 160.0).collect();
     let bend = u.iter().map(|u| (0.5 * TAU * u).sin()).collect();
     let pieces = vec![Piece::Strip { geodesic: 7.0 }; 160];
@@ -239,7 +242,7 @@ fn test_boards_that_turn_in_their_plane_cross_without_bending_by_half_a_turn() {
 }
 
 #[test]
-fn test_fine_elements_are_taken_together() {
+fn test_fine_elements_are_merged() {
     let fine = eight(20_000, 0.0, 1.0, 0.0);
     let taken = thinned(&fine, 1);
     assert!(taken.elements() < 5000);
@@ -293,7 +296,7 @@ fn test_triangle_is_pierced_through_its_boundary_and_its_vertices_but_not_beside
     for (x, y) in [(-0.06, 0.2), (0.5, 0.5), (0.2, -0.01), (-0.05, 1.01)] {
         assert!(!through(x, y, [-1.0, 1.0]));
     }
-    // Of two edges that meet in its plane one pierces it if they lie on two sides, none or both if on one.
+    // Two edges meet in the triangle's plane: one edge pierces it if they lie on two sides, none or both if they lie on one.
     for [from, to] in [[-1.0, 1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, -1.0]] {
         let [first, second] = [through(0.2, 0.2, [from, 0.0]), through(0.3, 0.2, [0.0, to])];
         assert_eq!(first != second, from != to);

@@ -1,0 +1,146 @@
+//! Settings of the search for all equilibria: its extent, and its tolerances for equal equilibria.
+
+use super::height;
+use crate::analysis::symmetry::{SAME, are_images};
+use crate::equilibrium::Equilibrium;
+
+/// Extent of the search and its tolerances for equal equilibria; with the defaults it finds all that are known of the
+/// scenarios tried.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SearchSettings {
+    /// Waves of bend, laid over every arch and the straight belt; amplitudes in 1/U.
+    pub bend_waves: Vec<Wave>,
+    /// Waves of rib slope, each laid over with every wave of bend; amplitudes, a number.
+    pub slope_waves: Vec<Wave>,
+    /// Sums of waves from which the search starts as well, a number.
+    pub sums: usize,
+    /// Greatest count of perturbed minima, a number.
+    pub perturbed: usize,
+    /// Modes along which a minimum is perturbed, a number.
+    pub perturbed_modes: usize,
+    /// Displacements of a minimum along each of these modes, in norms of the mode.
+    pub perturbations: Vec<f64>,
+    /// Greatest count of equilibria continued in modal loads, a number.
+    pub continued: usize,
+    /// Equilibria continued at a time, a number: lower ones that are found meanwhile come first.
+    pub at_a_time: usize,
+    /// Modes along which an equilibrium is loaded, a number for each count of negative modes; equilibria with more negative
+    /// modes are not reported.
+    pub loaded_modes: [usize; 3],
+    /// Displacement from a saddle along its lowest mode, from where it is downhill, in norms of the mode.
+    pub off_saddle: f64,
+    /// Elements of the mesh that confirms an equilibrium, as a multiple of the scenario's.
+    pub refinement: usize,
+    /// Difference of energy up to which two equilibria on one mesh may be the same, a share.
+    pub same_level: f64,
+    /// Distance of nodes up to which two equilibria on one mesh may be the same, in U.
+    pub same_distance: f64,
+    /// Difference of energy up to which two equilibria on different meshes may be the same, a share.
+    pub like_level: f64,
+    /// Distance of nodes up to which two equilibria on different meshes may be the same, in U.
+    pub like_distance: f64,
+    /// Bending energy of a belt that counts as flat, in the scenario's unit of energy.
+    pub flat_energy: f64,
+    /// Bulge by which one mirror image is the higher, in U.
+    pub higher: f64,
+    /// Miss of the supports up to which a mirror image meets them, lengths in U and angles in rad.
+    pub miss: f64,
+}
+
+/// A wave along the belt.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wave {
+    /// Half waves over the length of the belt, a number.
+    pub half_waves: f64,
+    /// Largest value, in the unit of the field.
+    pub amplitude: f64,
+}
+
+impl Default for SearchSettings {
+    fn default() -> Self {
+        let waves = |waves: &[(f64, f64)]| {
+            let wave = |&(half_waves, amplitude)| Wave {
+                half_waves,
+                amplitude,
+            };
+            waves.iter().map(wave).collect()
+        };
+        Self {
+            bend_waves: waves(&[
+                (0.0, 0.0),
+                (0.0, 4.0),
+                (0.0, -4.0),
+                (1.0, 4.0),
+                (1.0, -4.0),
+                (2.0, 8.0),
+                (2.0, -8.0),
+                (3.0, 12.0),
+                (3.0, -12.0),
+            ]),
+            slope_waves: waves(&[(1.0, 0.0), (1.0, 0.5), (1.0, -0.5), (2.0, 0.5), (2.0, -0.5)]),
+            sums: 4000,
+            perturbed: 96,
+            perturbed_modes: 4,
+            perturbations: vec![0.1, -0.1, 0.3, -0.3],
+            continued: 16,
+            at_a_time: 4,
+            loaded_modes: [6, 4, 0],
+            off_saddle: 0.01,
+            refinement: 2,
+            same_level: 1e-4,
+            same_distance: SAME,
+            like_level: 0.02,
+            like_distance: 0.03,
+            flat_energy: 1e-6,
+            higher: 1e-9,
+            miss: 1e-6,
+        }
+    }
+}
+
+impl SearchSettings {
+    /// Greatest number of negative modes of a reported equilibrium.
+    pub(super) fn highest_index(&self) -> usize {
+        self.loaded_modes.len() - 1
+    }
+
+    /// Whether two equilibria are the same but for a symmetry.
+    pub(super) fn is_same(&self, a: &Equilibrium, b: &Equilibrium) -> bool {
+        self.is_within(a, b, self.same_level, self.same_distance)
+    }
+
+    /// Whether two equilibria may be the same but for a symmetry and the mesh.
+    pub(super) fn is_like(&self, a: &Equilibrium, b: &Equilibrium) -> bool {
+        self.is_within(a, b, self.like_level, self.like_distance)
+    }
+
+    /// Whether two equilibria differ by no more than a share of the energy and a distance in U, and in no number of negative
+    /// modes.
+    pub(super) fn is_within(
+        &self,
+        a: &Equilibrium,
+        b: &Equilibrium,
+        share: f64,
+        distance: f64,
+    ) -> bool {
+        let solved = || Some((a.solved.as_ref()?, b.solved.as_ref()?));
+        let is_level = (a.energy - b.energy).abs() <= share * self.size(a).max(self.size(b));
+        let index = |e: &Equilibrium| e.stability.map(|s| s.negative_modes);
+        is_level
+            && index(a) == index(b)
+            && solved()
+                .is_some_and(|(a, b)| are_images(&a.at.point.poses, &b.at.point.poses, distance))
+    }
+
+    /// Scale of differences of energy: the bending energy, because the zero of a load's potential is arbitrary; of a flat
+    /// belt `flat_energy`.
+    pub(super) fn size(&self, equilibrium: &Equilibrium) -> f64 {
+        let unit = equilibrium.problem.units().energy;
+        equilibrium.elastic_energy.max(self.flat_energy * unit)
+    }
+
+    /// Whether the first of two mirror images bulges more along `solver.bulge`.
+    pub(super) fn is_higher(&self, one: &Equilibrium, other: &Equilibrium) -> bool {
+        height(one) > height(other) + self.higher * one.spine.length()
+    }
+}

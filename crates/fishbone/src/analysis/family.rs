@@ -1,0 +1,147 @@
+//! The programmes of the problems along a path, for the solver to continue a solution along.
+
+use crate::analysis::path::Path;
+use crate::analysis::sensitivity::add_support_motion;
+use crate::problem::program::{BeltPoint, BeltProgram, rows_of};
+use crate::problem::{Mesh, Problem};
+use stagewise::{Direction, Family, Program, Stationary, by_differences};
+
+/// A station of a branch.
+pub(super) type Station = stagewise::Station<BeltPoint, 8>;
+
+/// The programmes of the problems along a path, all on the same mesh.
+pub(super) struct Along {
+    pub(super) path: Path,
+    pub(super) mesh: Mesh,
+}
+
+impl Along {
+    /// The problem at a place, with its programme.
+    pub(super) fn meshed(&self, place: f64) -> Option<(Problem, BeltProgram)> {
+        let problem = self.path.at(place)?;
+        let program = problem.program_on(&self.mesh)?;
+        Some((problem, program))
+    }
+
+    /// Whether the active sets of the programmes are right for a station.
+    pub(super) fn holds(&self, station: &Station) -> bool {
+        self.meshed(station.parameter)
+            .is_some_and(|(problem, program)| {
+                let fault = problem.active_set_fault(&program, &station.at.point);
+                fault.is_none()
+            })
+    }
+
+    /// Whether the supports are out of the belt's reach next to a place, so that the belt is near its inextensible limit.
+    pub(super) fn is_near_limit(&self, place: f64) -> bool {
+        /// Distance along the path to the places on either side that are examined, in legs.
+        const BESIDE: f64 = 2e-3;
+        let beside = [place - BESIDE, place + BESIDE].map(|place| self.path.at(place));
+        let mut known = beside.iter().flatten();
+        known.any(|problem| problem.unreachable_supports().is_some())
+    }
+}
+
+impl Family<6, 2, 8> for Along {
+    type Point = BeltPoint;
+    type Program = BeltProgram;
+
+    fn at(&self, place: f64) -> Option<BeltProgram> {
+        self.path.at(place)?.program_on(&self.mesh)
+    }
+
+    /// The derivative is exact where a support moves; other changes of a scenario may change any part of the programme.
+    fn conditions_by_parameter(
+        &self,
+        program: &BeltProgram,
+        at: &Stationary<BeltPoint>,
+        place: f64,
+    ) -> Option<Direction<8>> {
+        let Some((support, motion)) = self.path.support_motion(place) else {
+            return by_differences(self, at, place);
+        };
+        let mut conditions = Direction::zeros(&program.layout());
+        let rows = rows_of(&at.multipliers.equalities, support);
+        let held = &program.supports[support];
+        let pose = &at.point.poses[held.node];
+        let turn = held.turn(pose, &rows);
+        add_support_motion(held, &turn, pose, support, &motion, &mut conditions);
+        Some(conditions)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis::path::Motion;
+    use crate::scenario::{BeltSpec, Component, Place, Scenario, SegmentSpec, SupportSpec};
+    use crate::solve::solve;
+    use nalgebra::Vector3;
+    use stagewise::Response;
+    use std::ops::ControlFlow;
+
+    type Vector8 = stagewise::NodeVector<8>;
+
+    /// A belt of length 2 with an arc, twisted and moved aside.
+    fn problem() -> Problem {
+        let arc = SegmentSpec::Arc {
+            length: 0.5,
+            curvature: 0.7,
+            rigidity: None,
+            natural_bend: None,
+        };
+        let segments = vec![SegmentSpec::straight(1.5), arc];
+        let mut scenario = Scenario::new(BeltSpec::new(0.1, 2.0, segments));
+        let clamp = |at, position: [f64; 3], rotation| SupportSpec {
+            position: Some(position.map(Component::Held)),
+            rotation: Some(rotation),
+            ..SupportSpec::new(at)
+        };
+        scenario.supports = vec![
+            clamp(Place::Start, [0.1, 0.2, -0.3], [0.0, 0.3, 0.1]),
+            clamp(Place::End, [0.3, 1.2, 0.4], [0.2, -0.7, 0.5]),
+        ];
+        scenario.solver.elements = Some(24);
+        Problem::new(scenario).unwrap()
+    }
+
+    #[test]
+    fn test_derivative_by_a_support_s_motion_agrees_with_differences() {
+        let problem = problem();
+        let equilibrium = solve(&problem, &mut || ControlFlow::Continue(()));
+        let solved = equilibrium.certified().unwrap();
+        let poses = [
+            (Vector3::new(0.2, 1.1, 0.1), Vector3::new(0.5, -0.2, 1.1)),
+            (Vector3::new(0.4, 1.0, 0.3), Vector3::new(-0.4, 0.6, 0.3)),
+        ];
+        for motion in [Motion::Straight, Motion::Screw] {
+            let family = Along {
+                path: Path::poses(&problem, 1, &poses, motion).unwrap(),
+                mesh: Mesh::of(&problem, &solved.program),
+            };
+            for place in [0.2, 0.7, 1.4] {
+                let program = family.at(place).unwrap();
+                let mut at = solved.at.clone();
+                let mut response = Response::of_stationary(&program, &mut at).unwrap();
+                let exact = family.conditions_by_parameter(&program, &at, place);
+                let nearly = by_differences(&family, &at, place);
+                let [exact, nearly] =
+                    [exact, nearly].map(|by| response.solve(&by.unwrap()).unwrap());
+                let mut error = exact.clone();
+                error.add(-1.0, &nearly);
+                let most = |nodes: &[Vector8]| nodes.iter().map(|n| n.amax()).fold(0.0, f64::max);
+                assert!(
+                    most(&error.nodes) < 1e-6 * most(&exact.nodes),
+                    "{motion:?} {place}"
+                );
+                let rows = exact.equalities.iter().zip(&error.equalities);
+                for (row, error) in rows {
+                    assert!(
+                        error.abs() < 1e-6 * row.abs().max(1.0),
+                        "{motion:?} {place}"
+                    );
+                }
+            }
+        }
+    }
+}
