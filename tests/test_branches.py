@@ -89,7 +89,7 @@ def test_stability_is_that_of_the_count(arches):
 
 
 def test_a_saddle_lies_above_the_minima_on_either_side(arches, arch):
-    """Pushed either way along its one negative mode a belt falls to minima that are among those found."""
+    """Perturbed either way along its one negative mode a belt falls to minima that are among those found."""
     saddle = next(one for one in arches if one.negative_modes == 1)
     (mode,) = saddle.modes(1)
     assert mode.eigenvalue < 0.0
@@ -112,7 +112,7 @@ def test_a_finer_mesh_has_them_too(arches):
         assert np.abs(spine_at(fine, one.u) - one.position).max() < 0.03
 
 
-def test_of_mirror_twins_the_one_is_given_that_bulges_as_asked(arches, mirrored_arches):
+def test_of_two_mirror_images_the_list_has_the_one_on_the_side_of_bulge(arches, mirrored_arches):
     """Asked for the other side, of the lowest four each comes once, mirrored; the mesh is another."""
     for one, other in zip(arches[:4], mirrored_arches, strict=False):
         assert other.energy == pytest.approx(one.energy, rel=1e-3)
@@ -146,7 +146,7 @@ def test_a_belt_that_nothing_holds_is_flat_and_that_once(search):
     assert flat.energy < 1e-12
 
 
-# ---------------------------------------------------------------------------------------- how it is asked and told
+# ---------------------------------------------------------------------------------------- arguments and progress
 
 
 def test_out_of_reach_is_one_infeasible_result(out_of_reach):
@@ -171,17 +171,17 @@ def test_the_search_is_the_whole_one_unless_a_budget_is_given():
 
 
 def test_progress_never_passes_what_is_planned(arch):
-    told = []
+    calls = []
 
     def progress(done, planned):
-        told.append((done, planned))
-        if len(told) == 5:
+        calls.append((done, planned))
+        if len(calls) == 5:
             raise EnoughError
 
     with pytest.raises(EnoughError):
         fb.branches(arch, progress=progress)
-    assert all(0 <= done <= planned for done, planned in told)
-    assert told == sorted(told)
+    assert all(0 <= done <= planned for done, planned in calls)
+    assert calls == sorted(calls)
 
 
 @pytest.mark.parametrize("nothing", [None, {}, SimpleNamespace(_inner=None)])
@@ -238,7 +238,7 @@ def test_a_start_may_have_fewer_points_than_the_mesh(arches, arch):
 
 
 @pytest.mark.parametrize(
-    ("start", "said"),
+    ("start", "words"),
     [
         (([0.0], [0.0]), "m at least 2"),
         (([0.0, 0.0], [0.0, 0.0, 0.0]), "found shapes.*allowed"),
@@ -252,6 +252,6 @@ def test_a_start_may_have_fewer_points_than_the_mesh(arches, arch):
         ("ab", "no pair"),
     ],
 )
-def test_what_is_no_shape_is_no_start(arch, start, said):
-    with pytest.raises(fb.InvalidArgument, match=f"start: .*{said}"):
+def test_what_is_no_shape_is_no_start(arch, start, words):
+    with pytest.raises(fb.InvalidArgument, match=f"start: .*{words}"):
         fb.solve(arch, start=start)

@@ -1,13 +1,13 @@
 """Kernels that take several elements at a time are vectorised in the core that is installed.
 
 A branch in a lane, or a helper that is not inlined, makes the compiler take the lanes one after the other: no result
-changes, and the speed is gone. What the compiler has made of them is read off the core itself. That needs no clock and
-no second build, and it is what runs; assembly of the crate alone would be made before the optimisation of the whole.
+changes, and the speed is gone. So the tests count the vector instructions of the built core. The count needs no clock
+and no second build, and it includes the optimisation of the whole core, which the assembly of the crate alone does not.
 
-The core has no names of functions. Where they begin and end is in its tables for unwinding, and the kernels are told
-apart by what they do: the rest of the core is made for processors without AVX, so that an instruction that begins with
-v belongs to a kernel. Kernels of matrixmultiply fuse products with sums; those of this project never do, for results
-that are the same on every processor.
+The core has no names of functions. Its tables for unwinding have the first and last address of each function. The rest
+of the core is made for processors without AVX, so that an instruction that begins with v belongs to a kernel. Kernels
+of matrixmultiply fuse products with sums; those of this project never do, for results that are the same on every
+processor.
 """
 
 from __future__ import annotations

@@ -14,14 +14,14 @@ if TYPE_CHECKING:
 
 
 class _Budget(NamedTuple):
-    """How much is searched, where that is to be less than usual: a search of seconds, which misses some."""
+    """Sizes of a search smaller than the default: it takes seconds, and misses equilibria."""
 
     sums: int
-    """Sums of waves among the starts, a number."""
+    """Number of sums of waves among the starts."""
     perturbed: int
-    """Minima that are perturbed, the largest number."""
+    """Greatest number of minima that are perturbed."""
     continued: int
-    """Equilibria that are continued in modal loads, the largest number."""
+    """Greatest number of equilibria that are continued in modal loads."""
 
 
 def branches(scenario: Scenario, *, progress: Callable[[int, int], object] | None = None) -> list[Equilibrium]:
