@@ -3,7 +3,6 @@
 use crate::equilibrium::guess::{buckle, disturb, guess, inside, is_flat, ring};
 use crate::problem::program::{BeltPoint, BeltProgram, Piece};
 use crate::scenario::SAME_PLACE;
-use crate::strip::developable::EnergyModel;
 use nalgebra::{Vector2, Vector3};
 use stagewise::{Outcome, Program, Settings, Solution};
 use std::f64::consts::PI;
@@ -201,8 +200,7 @@ impl Search {
         inside(program, point)
     }
 
-    /// Solves with another energy model, and from its solution with the programme's own: first `wunderlich`, which keeps the
-    /// ribs apart of itself; for a `wunderlich` programme `sadowsky`, which lets them come close.
+    /// Solves with the stand-in of the programme's energy, and from its solution with the programme's own.
     fn by_way_of_another(
         &self,
         program: &BeltProgram,
@@ -210,10 +208,7 @@ impl Search {
         proceed: &mut Proceed,
     ) -> Solution<BeltPoint> {
         let mut other = program.clone();
-        other.model = match program.model {
-            EnergyModel::Wunderlich => EnergyModel::Sadowsky,
-            EnergyModel::Fishbone | EnergyModel::Sadowsky => EnergyModel::Wunderlich,
-        };
+        other.model = program.model.stand_in();
         let found = self.minimise(&other, start.clone(), self.settings.cold_barrier, proceed);
         let iterations = found.iterations;
         self.minimise(

@@ -32,6 +32,15 @@ pub(crate) struct Term {
 }
 
 impl EnergyModel {
+    /// The density that a search solves with where this one leads to no minimum: `wunderlich`, which keeps the ribs apart of
+    /// itself, and for `wunderlich` the density that lets them come close.
+    pub(crate) fn stand_in(self) -> Self {
+        match self {
+            Self::Wunderlich => Self::Sadowsky,
+            Self::Fishbone | Self::Sadowsky => Self::Wunderlich,
+        }
+    }
+
     /// Whether the density depends on the width of the board.
     pub(crate) fn knows_width(self) -> bool {
         self == Self::Wunderlich
