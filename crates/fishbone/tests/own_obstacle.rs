@@ -60,56 +60,45 @@ fn minimum(program: &BeltProgram, mut start: BeltPoint) -> Solution<BeltPoint> {
     stagewise::minimise(program, &settings, start, &mut || ControlFlow::Continue(()))
 }
 
+fn highest(found: &Solution<BeltPoint>) -> f64 {
+    let heights = found.at.point.poses.iter().map(|pose| pose.position.x);
+    heights.fold(0.0, f64::max)
+}
+
 #[test]
 fn test_arch_under_a_ceiling_touches_it_and_its_contact_forces_balance_the_reactions() {
     let (mut program, free) = arch();
     assert_eq!(free.outcome, Outcome::Converged);
-    let top = free
-        .at
-        .point
-        .poses
-        .iter()
-        .map(|pose| pose.position.x)
-        .fold(0.0, f64::max);
-    let ceiling = Arc::new(HalfSpace {
-        normal: Vector3::x(),
-        height: 0.8 * top,
-    });
-    program.obstacles = (1..80)
-        .map(|node| NodeObstacle {
-            node,
-            obstacle: ceiling.clone(),
-            weight: 1.0 / 80.0,
-        })
-        .collect();
-    // The start is a lower arch, which does not reach the end's support yet.
+    let height = 0.8 * highest(&free);
+    let normal = Vector3::x();
+    let ceiling = Arc::new(HalfSpace { normal, height });
+    let before_node = |node| NodeObstacle {
+        node,
+        obstacle: ceiling.clone(),
+        weight: 1.0 / 80.0,
+    };
+    program.obstacles = (1..80).map(before_node).collect();
+    // From a lower arch, which does not reach the end's support yet.
     let mut low = free.at.point.clone();
     low.fields.iter_mut().for_each(|fields| *fields *= 0.6);
     let found = minimum(&program, low);
     assert_eq!(found.outcome, Outcome::Converged, "{:?}", found.residuals);
     assert!(found.values.objective > free.values.objective);
+    let (point, multipliers) = (&found.at.point, &found.at.multipliers);
     let first = program.layout().inequalities_at_stages();
-    let multipliers = &found.at.multipliers;
-    let contact: Vector3<f64> = program
+    let contacts = program
         .obstacles
         .iter()
-        .zip(&multipliers.inequalities[first..])
-        .map(|(contact, multiplier)| {
-            contact.force(&found.at.point.poses[contact.node], *multiplier)
-        })
+        .zip(&multipliers.inequalities[first..]);
+    let contact: Vector3<f64> = contacts
+        .map(|(contact, multiplier)| contact.force(&point.poses[contact.node], *multiplier))
         .sum();
-    let reactions = program.reactions(&found.at.point, &multipliers.equalities);
+    let reactions = program.reactions(point, &multipliers.equalities);
     let held: Vector3<f64> = reactions.iter().map(|(force, _)| force).sum();
+    let miss = (contact + held).norm();
     assert!(
-        contact.x < -1.0 && (contact + held).norm() < 1e-6 * contact.norm(),
+        contact.x < -1.0 && miss < 1e-6 * contact.norm(),
         "{contact} {held}"
     );
-    let highest = found
-        .at
-        .point
-        .poses
-        .iter()
-        .map(|pose| pose.position.x)
-        .fold(0.0, f64::max);
-    assert!((highest - 0.8 * top).abs() < 1e-6, "{highest} {top}");
+    assert!((highest(&found) - height).abs() < 1e-6);
 }
