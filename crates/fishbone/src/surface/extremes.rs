@@ -95,7 +95,7 @@ pub struct BendRadius {
 pub struct SpineRadius {
     /// Radius.
     pub value: f64,
-    /// Arc length.
+    /// Arc length of its place.
     pub u: f64,
 }
 
@@ -104,16 +104,18 @@ pub struct SpineRadius {
 /// Over the whole width the radius falls with every refinement of the mesh, at the inflections of the spine; on the
 /// spine it converges.
 pub fn least_spine_radius(spine: &Spine) -> Option<SpineRadius> {
-    let radius = |u: f64, bend: f64, slope: f64| SpineRadius {
-        value: 1.0 / curvature(bend, slope).abs(),
-        u,
+    let at_node = |node: usize| SpineRadius {
+        value: 1.0 / node_curvature(spine, node),
+        u: peak_at(spine, node),
     };
-    let at_node = |node: usize| radius(spine.u[node], spine.bend[node], spine.rib_slope[node]);
     let inside = |element: usize| {
         let turning = turning_points(spine, element).into_iter();
         turning.map(move |distance| {
             let (bend, slope) = spine.fields(element, distance);
-            radius(spine.u[element] + distance, bend, slope)
+            SpineRadius {
+                value: 1.0 / curvature(bend, slope).abs(),
+                u: spine.u[element] + distance,
+            }
         })
     };
     let radii = (0..spine.u.len())
@@ -121,6 +123,31 @@ pub fn least_spine_radius(spine: &Spine) -> Option<SpineRadius> {
         .chain(spine.strips().flat_map(inside));
     let least = radii.min_by(|a, b| a.value.total_cmp(&b.value));
     least.filter(|radius| radius.value.is_finite())
+}
+
+fn node_curvature(spine: &Spine, node: usize) -> f64 {
+    curvature(spine.bend[node], spine.rib_slope[node]).abs()
+}
+
+/// Arc length of the peak of the curvature at a node: the vertex of the parabola through it and its neighbours, where they
+/// lie on one smooth stretch and are no higher.
+///
+/// The slope of the parabola is that of the chords in the middles of the elements, and linear.
+fn peak_at(spine: &Spine, node: usize) -> f64 {
+    let u = spine.u[node];
+    let is_inside = 0 < node && node < spine.elements();
+    if !is_inside || spine.pieces[node - 1] != spine.pieces[node] {
+        return u;
+    }
+    let [before, after] = [node - 1, node].map(|element| {
+        let rise = node_curvature(spine, element + 1) - node_curvature(spine, element);
+        let middle = 0.5 * (spine.u[element] + spine.u[element + 1]);
+        (middle, rise / spine.element_length(element))
+    });
+    match before.1 >= 0.0 && after.1 <= 0.0 && before.1 > after.1 {
+        true => before.0 + (after.0 - before.0) * before.1 / (before.1 - after.1),
+        false => u,
+    }
 }
 
 /// Distances into an element at which its curvature, ω_ζ (1 + β²) with both fields linear, turns from rising to falling or
@@ -281,6 +308,18 @@ mod tests {
         assert_relative_eq!(least.u, u, epsilon = 1e-13);
         let expected = 1.0 / ((2.0 - u) * (1.0 + 25.0 * u * u));
         assert_relative_eq!(least.value, expected, epsilon = 1e-13);
+    }
+
+    #[test]
+    fn test_tightest_bend_of_the_spine_is_placed_between_equal_nodes() {
+        let hump = |u: f64| 3.0 - 8.0 * (u - 0.43).powi(2);
+        for n in [7, 9, 20] {
+            let least = least_spine_radius(&spine(1.0, 0.1, n, hump, |_| 0.0)).unwrap();
+            assert_relative_eq!(least.u, 0.43, epsilon = 1e-13);
+            let tent = |u: f64| 1.0 - (u - 1.0).abs();
+            let peak = least_spine_radius(&spine(2.0, 0.1, 2 * n, tent, |_| 0.0)).unwrap();
+            assert_eq!((peak.u, peak.value), (1.0, 1.0));
+        }
     }
 
     #[test]
