@@ -212,14 +212,16 @@ def convergence_rows() -> Iterator[list[str]]:
 
 
 def radius_rows() -> Iterator[list[str]]:
-    """Least bend radius over the width and on the spine, example 1."""
+    """Least bend radius over the width and on the spine, and the radius of the area, example 1."""
     for elements in (80, 160, 320, 640, 1280):
         row = [str(elements)]
         for energy in ENERGIES:
             shape = solve(example("example1"), energy, elements)
             least = shape.least_bend_radius
             assert least is not None
-            row += [scientific(least.value), number(1.0 / np.abs(shape.curvature).max(), 4)]
+            on_spine, over_area = shape.bend_radius
+            assert on_spine is not None
+            row += [scientific(least.value), number(on_spine.value, 4), number(over_area.p99, 4)]
         yield row
 
 
@@ -277,7 +279,7 @@ def main() -> None:
         *(f"example 1, {energy}" for energy in by_energy),
     ]
     write("convergence", table(header, convergence_rows()))
-    header = ["elements", *(text for energy in by_energy for text in (energy, "on the spine"))]
+    header = ["elements", *(text for energy in by_energy for text in (energy, "on the spine", "99 % of the area"))]
     write("bend radius", table(header, radius_rows()))
     header = ["case", "iterations", "median [ms]", "least", "most"]
     machine = f"{processor()}, one thread, {REPETITIONS} solves each, fishbone {fb.__version__}."

@@ -1,6 +1,7 @@
 import csv
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -47,13 +48,16 @@ def test_the_table_shows_energy_extremes_and_reactions(run, example_file):
     for quantity in (
         "energy",
         "highest point",
-        "least bend radius",
+        "least bend radius, on the spine",
+        "bend radius, 99 % of the area",
+        "crosses itself",
         "largest rib angle",
         "iterations",
         "residual",
         "time",
     ):
         assert quantity in out
+    assert "whole width" not in out
     for place in ("start", "end"):
         assert f"force on the belt, {place}" in out
         assert f"moment on the belt, {place}" in out
@@ -70,6 +74,16 @@ def test_the_table_shows_loads_links_and_hinges(run, example):
     assert code == 0
     for words in ("end hinged about zeta", "gravity", "load, u = 0.5", "force of the link from u = 0.3, u = 0.7"):
         assert words in out
+
+
+def test_a_self_crossing_is_a_row_of_the_table_and_a_warning(run, example):
+    tables = example.to_dict()
+    tables["supports"][1] |= {"position": [-0.1, 0.0, 0.0], "rotation": [0.0, 0.0, 2.4]}
+    Path("teardrop.json").write_text(json.dumps(tables), "utf-8")
+    code, out, err = run("solve", "teardrop.json")
+    assert code == 0
+    assert re.search(r"crosses itself +yes +at u = [\d.]+ and u = [\d.]+", out)
+    assert_one_line(err, "warning: the belt crosses itself at u = ")
 
 
 def test_all_outputs_are_written_and_nothing_else(run, example_file):

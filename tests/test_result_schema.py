@@ -42,6 +42,7 @@ KEYS = {
     "internal",
     "supports",
     "least_bend_radius",
+    "bend_radius",
     "rib_margin",
     "crosses_itself",
     "stable",
@@ -101,6 +102,8 @@ def test_result_has_every_key_of_the_schema(energy: Energy, name: str) -> None:
     assert set(output["edges"]) >= {"minus", "plus"}
     assert set(output["internal"]) >= {"force", "moment"}
     assert set(output["least_bend_radius"]) >= {"value", "u", "v"}
+    assert set(output["bend_radius"]["spine"]) >= {"value", "u"}
+    assert set(output["bend_radius"]["area"]) >= {"p999", "p99", "p95"}
     assert set(output["rib_margin"]) >= {"value", "u"}
     assert set(output["residuals"]) >= {"stationarity", "constraint", "complementarity"}
     for entry in output["supports"]:

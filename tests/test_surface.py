@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Callable
 
 import numpy as np
@@ -180,6 +181,9 @@ def test_plane_belt_crosses_itself_where_its_spine_meets_itself(energy: Energy) 
     [expected] = meeting_places(equilibrium)
     assert equilibrium.crosses_itself == pytest.approx(expected, abs=1.0 / 80.0)
     assert result(equilibrium)["crosses_itself"] == list(equilibrium.crosses_itself or ())
+    [warning] = [line for line in result(equilibrium)["warnings"] if "crosses itself" in line]
+    assert warning in equilibrium.warnings
+    assert [float(u) for u in re.findall(r"u = (\d\.\d+)", warning)] == pytest.approx(expected, abs=1.0 / 80.0)
 
 
 @energy_model
@@ -188,6 +192,7 @@ def test_belt_whose_legs_pass_above_each_other_by_more_than_the_width_does_not_c
     equilibrium = solve(teardrop(0.3, energy))
     assert meeting_places(equilibrium)
     assert equilibrium.crosses_itself is None
+    assert equilibrium.warnings == []
 
 
 # -------------------------------------------------------------------------------------- developable, isometric

@@ -11,6 +11,8 @@ from types import ModuleType
 from fishbone._core import __version__
 from fishbone.branches import branches
 from fishbone.equilibrium import (
+    AreaRadii,
+    BendRadii,
     BendRadius,
     Edges,
     Equilibrium,
@@ -46,6 +48,8 @@ from fishbone.sensitivity import Change, Gradient, Sensitivity
 from fishbone.tracker import Tracker, Update
 
 __all__ = [
+    "AreaRadii",
+    "BendRadii",
     "BendRadius",
     "Branch",
     "Change",

@@ -6,6 +6,7 @@ import contextlib
 import csv
 import io
 import json
+from itertools import compress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -213,8 +214,12 @@ def _console() -> Console:
 
 
 def _warn(file: Path, equilibria: list[Equilibrium]) -> None:
-    """Prints warnings, each once. Of several equilibria the saddles are left out: the table marks them."""
-    shown = equilibria if len(equilibria) == 1 else [one for one in equilibria if one.stable is not False]
+    """Prints warnings, each once.
+
+    Of several equilibria the saddles and those that cross themselves are left out: the table marks them.
+    """
+    is_sound = [one.stable is not False and one.crosses_itself is None for one in equilibria]
+    shown = equilibria if len(equilibria) == 1 else list(compress(equilibria, is_sound))
     for warning in dict.fromkeys(warning for equilibrium in shown for warning in equilibrium.warnings):
         click.echo(f"fishbone: {file}: warning: {warning}", err=True)
 

@@ -142,6 +142,23 @@ class SpineRadius(NamedTuple):
     u: float
 
 
+class AreaRadii(NamedTuple):
+    """The bend radii exceeded on 99.9, 99 and 95 % of the board's area; `math.inf` where more than the rest is flat."""
+
+    p999: float
+    p99: float
+    p95: float
+
+
+class BendRadii(NamedTuple):
+    """The tightness of a belt: quantities that converge under refinement of the mesh."""
+
+    spine: SpineRadius | None
+    """The least bend radius on the spine; None where nothing bends."""
+    area: AreaRadii
+    """The bend radii exceeded on given shares of the area."""
+
+
 class RibMargin(NamedTuple):
     """The least slack of the rib bound, 2/V − |s|, and its place; s is the rib convergence."""
 
@@ -349,7 +366,7 @@ class Equilibrium:
         """The least bend radius of the whole belt, often at an edge; None where nothing bends.
 
         The radius falls with every refinement of the mesh, because ribs all but meet on an edge where the bend changes
-        sign. `least_spine_radius` converges.
+        sign. `bend_radius` converges.
         """
         least = self._inner.least_bend_radius
         return None if least is None else BendRadius(*least)
@@ -359,6 +376,23 @@ class Equilibrium:
         """The least bend radius on the spine; None where nothing bends."""
         least = self._inner.least_spine_radius
         return None if least is None else SpineRadius(*least)
+
+    @property
+    def bend_radius(self) -> BendRadii:
+        """The least bend radius on the spine, and the radii exceeded on 99.9, 99 and 95 % of the board's area.
+
+        The whole area counts: stiffeners, and corners that no rib reaches, have an infinite radius.
+        """
+        return BendRadii(self.least_spine_radius, AreaRadii(*self._inner.area_radii))
+
+    def area_below(self, radius: float) -> float:
+        """The share of the board's area with a bend radius below `radius`, between 0 and 1.
+
+        Errors: `InvalidArgument` unless the radius is positive and finite.
+        """
+        if not (np.ndim(radius) == 0 and 0.0 < radius < math.inf):
+            raise InvalidArgument(f"radius: found {radius!r}, allowed a positive finite number")
+        return self._inner.area_below(radius)
 
     @property
     def rib_margin(self) -> RibMargin:

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
 DIGITS = 5
 """Significant digits, about the accuracy of the default mesh."""
-RIBS_MEET = 1e-3
-"""Bend radius, in widths, below which "ribs meet" is printed in place of the radius."""
 ENDS: dict[End, str] = {
     "closed": "ends where it began",
     "budget": "has used up its states before the end of the path",
@@ -125,6 +123,7 @@ def _quantities(equilibrium: Equilibrium) -> Iterator[tuple[str, str, str]]:
     yield from _extremes(equilibrium)
     if equilibrium.half_turns is not None:
         yield "half turns", str(equilibrium.half_turns), "of a closed belt"
+    yield "crosses itself", *_crossing(equilibrium.crosses_itself)
     yield "local minimum", MINIMUM[equilibrium.stable], ""
     for name, residual in equilibrium.residuals._asdict().items():
         yield f"residual, {name}", f"{residual:.1e}", ""
@@ -133,17 +132,22 @@ def _quantities(equilibrium: Equilibrium) -> Iterator[tuple[str, str, str]]:
 
 
 def _extremes(equilibrium: Equilibrium) -> Iterator[tuple[str, str, str]]:
-    on_spine, least = equilibrium.least_spine_radius, equilibrium.least_bend_radius
+    on_spine, over_area = equilibrium.bend_radius
     if on_spine is not None:
         yield "least bend radius, on the spine", number(on_spine.value), f"at u = {number(on_spine.u)}"
-    if least is not None:
-        ribs_meet = least.value < RIBS_MEET * equilibrium.scenario.to_dict()["belt"]["width"]
-        value = "ribs meet" if ribs_meet else number(least.value)
-        yield "least bend radius, whole width", value, f"at u = {number(least.u)}, v = {number(least.v)} (see docs)"
+    if math.isfinite(over_area.p99):
+        yield "bend radius, 99 % of the area", number(over_area.p99), "or more"
     angle = np.degrees(equilibrium.rib_angle)
     angle[np.abs(angle) < NOUGHT] = 0.0
     largest = int(np.argmax(np.abs(angle)))
     yield "largest rib angle", number(abs(angle[largest])), f"degrees, at u = {number(equilibrium.u[largest])}"
+
+
+def _crossing(places: tuple[float, float] | None) -> tuple[str, str]:
+    if places is None:
+        return "no", ""
+    first, second = map(number, places)
+    return "yes", f"at u = {first} and u = {second}"
 
 
 def _vectors(equilibrium: Equilibrium) -> Table:

@@ -77,7 +77,7 @@ impl Equilibrium {
 
     #[getter]
     fn warnings(&self) -> Vec<String> {
-        self.solved.warnings.clone()
+        self.solved.warnings()
     }
 
     #[getter]
@@ -252,6 +252,17 @@ impl Equilibrium {
     fn least_spine_radius(&self) -> Option<(f64, f64)> {
         let least = surface::least_spine_radius(&self.solved.spine)?;
         Some((least.value, least.u))
+    }
+
+    /// Radii exceeded on 99.9, 99 and 95 % of the area.
+    #[getter]
+    fn area_radii(&self) -> [f64; 3] {
+        surface::BendDistribution::of(&self.solved.spine).quantiles()
+    }
+
+    /// Share of the area with a radius below a finite one.
+    fn area_below(&self, radius: f64) -> f64 {
+        surface::BendDistribution::of(&self.solved.spine).share_below(radius)
     }
 
     /// (value, u).

@@ -5,6 +5,7 @@ pub(crate) mod guess;
 mod intrinsic;
 mod search;
 mod stability;
+mod warnings;
 
 use crate::names::named;
 pub use stability::Stability;
@@ -62,8 +63,8 @@ pub struct Equilibrium {
     pub status: Status,
     /// One line for people: how the solve ended, and what to try.
     pub message: String,
-    /// Warnings to read before the result is relied on, one line each.
-    pub warnings: Vec<String>,
+    /// Warnings of the solve itself, one line each.
+    pub(crate) warnings: Vec<String>,
     /// Total potential, loads included.
     pub energy: f64,
     /// Elastic energy alone.

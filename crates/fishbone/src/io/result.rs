@@ -21,7 +21,7 @@ pub(crate) struct Record<'a> {
     schema: &'static str,
     status: Status,
     message: &'a str,
-    warnings: &'a [String],
+    warnings: Vec<String>,
     energy: f64,
     elastic_energy: f64,
     energy_model: EnergyModel,
@@ -40,6 +40,7 @@ pub(crate) struct Record<'a> {
     highest_point: HighestPoint,
     least_bend_radius: LeastBendRadius,
     least_spine_radius: LeastSpineRadius,
+    bend_radius: BendRadius,
     rib_margin: RibMargin,
     crosses_itself: Option<[f64; 2]>,
     twist: f64,
@@ -105,6 +106,21 @@ struct LeastSpineRadius {
     u: Option<f64>,
 }
 
+/// Null where infinite.
+#[derive(Debug, Clone, Serialize)]
+struct BendRadius {
+    spine: LeastSpineRadius,
+    area: AreaRadii,
+}
+
+/// Radii exceeded on 99.9, 99 and 95 % of the board's area.
+#[derive(Debug, Clone, Serialize)]
+struct AreaRadii {
+    p999: Option<f64>,
+    p99: Option<f64>,
+    p95: Option<f64>,
+}
+
 #[derive(Debug, Clone, Serialize)]
 struct RibMargin {
     value: f64,
@@ -131,11 +147,13 @@ impl<'a> Record<'a> {
         let spine = &equilibrium.spine;
         let highest = equilibrium.highest_point();
         let margin = surface::rib_margin(spine);
+        let spine_radius = surface::least_spine_radius(spine);
+        let crosses_itself = surface::crosses_itself(spine);
         Self {
             schema: SCHEMA,
             status: equilibrium.status,
             message: &equilibrium.message,
-            warnings: &equilibrium.warnings,
+            warnings: equilibrium.warnings_with(crosses_itself),
             energy: equilibrium.energy,
             elastic_energy: equilibrium.elastic_energy,
             energy_model: equilibrium.scenario().energy,
@@ -156,12 +174,16 @@ impl<'a> Record<'a> {
                 position: highest.position.into(),
             },
             least_bend_radius: LeastBendRadius::new(surface::least_bend_radius(spine)),
-            least_spine_radius: LeastSpineRadius::new(surface::least_spine_radius(spine)),
+            least_spine_radius: LeastSpineRadius::new(spine_radius),
+            bend_radius: BendRadius {
+                spine: LeastSpineRadius::new(spine_radius),
+                area: AreaRadii::new(&surface::BendDistribution::of(spine)),
+            },
             rib_margin: RibMargin {
                 value: margin.value,
                 u: margin.u,
             },
-            crosses_itself: surface::crosses_itself(spine),
+            crosses_itself,
             half_turns: equilibrium.half_turns,
             twist: spine.twist(),
             stable: equilibrium.stable(),
@@ -222,6 +244,14 @@ impl LeastSpineRadius {
             value: radius.map(|radius| radius.value),
             u: radius.map(|radius| radius.u),
         }
+    }
+}
+
+impl AreaRadii {
+    fn new(distribution: &surface::BendDistribution) -> Self {
+        let finite = |radius: f64| radius.is_finite().then_some(radius);
+        let [p999, p99, p95] = distribution.quantiles().map(finite);
+        Self { p999, p99, p95 }
     }
 }
 

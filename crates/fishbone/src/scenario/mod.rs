@@ -162,6 +162,14 @@ impl BeltSpec {
         sheet.or_else(layers)
     }
 
+    /// Whether the belt's material is given in SI units: by name, or by a Young's modulus that is too large to be in MPa.
+    pub(crate) fn is_in_si_units(&self) -> bool {
+        /// Young's modulus above that of every sheet. Units: MPa.
+        const STIFFEST: f64 = 2e6;
+        let sheet = self.material.as_ref().and_then(MaterialSpec::layer);
+        self.layers.is_some() || sheet.is_some_and(|sheet| sheet.material.young > STIFFEST)
+    }
+
     /// Whether any part of the unloaded belt is bent.
     pub(crate) fn has_natural_bend(&self) -> bool {
         self.segments

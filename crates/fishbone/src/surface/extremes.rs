@@ -95,22 +95,77 @@ pub struct BendRadius {
 pub struct SpineRadius {
     /// Radius.
     pub value: f64,
-    /// Arc length of the node.
+    /// Arc length of its place.
     pub u: f64,
 }
 
-/// The least radius of bend on the spine, 1/|κ₁| at its nodes; `None` where the belt is flat all over.
+/// The least radius of bend on the spine, 1/|κ₁|, between nodes too; `None` where the belt is flat all over.
 ///
 /// Over the whole width the radius falls with every refinement of the mesh, at the inflections of the spine; on the
 /// spine it converges.
 pub fn least_spine_radius(spine: &Spine) -> Option<SpineRadius> {
-    let radius = |(curvature, &u): (f64, &f64)| SpineRadius {
-        value: 1.0 / curvature.abs(),
-        u,
+    let at_node = |node: usize| SpineRadius {
+        value: 1.0 / node_curvature(spine, node),
+        u: peak_at(spine, node),
     };
-    let radii = spine.curvature().into_iter().zip(&spine.u).map(radius);
+    let inside = |element: usize| {
+        let turning = turning_points(spine, element).into_iter();
+        turning.map(move |distance| {
+            let (bend, slope) = spine.fields(element, distance);
+            SpineRadius {
+                value: 1.0 / curvature(bend, slope).abs(),
+                u: spine.u[element] + distance,
+            }
+        })
+    };
+    let radii = (0..spine.u.len())
+        .map(at_node)
+        .chain(spine.strips().flat_map(inside));
     let least = radii.min_by(|a, b| a.value.total_cmp(&b.value));
     least.filter(|radius| radius.value.is_finite())
+}
+
+fn node_curvature(spine: &Spine, node: usize) -> f64 {
+    curvature(spine.bend[node], spine.rib_slope[node]).abs()
+}
+
+/// Arc length of the peak of the curvature at a node: the vertex of the parabola through it and its neighbours, where they
+/// lie on one smooth stretch and are no higher.
+///
+/// The slope of the parabola is that of the chords in the middles of the elements, and linear.
+fn peak_at(spine: &Spine, node: usize) -> f64 {
+    let u = spine.u[node];
+    let is_inside = 0 < node && node < spine.elements();
+    if !is_inside || spine.pieces[node - 1] != spine.pieces[node] {
+        return u;
+    }
+    let [before, after] = [node - 1, node].map(|element| {
+        let rise = node_curvature(spine, element + 1) - node_curvature(spine, element);
+        let middle = 0.5 * (spine.u[element] + spine.u[element + 1]);
+        (middle, rise / spine.element_length(element))
+    });
+    match before.1 >= 0.0 && after.1 <= 0.0 && before.1 > after.1 {
+        true => before.0 + (after.0 - before.0) * before.1 / (before.1 - after.1),
+        false => u,
+    }
+}
+
+/// Distances into an element at which its curvature, ω_ζ (1 + β²) with both fields linear, turns from rising to falling or
+/// back: the roots of its derivative, a quadratic.
+fn turning_points(spine: &Spine, element: usize) -> Vec<f64> {
+    let rise = |field: &[f64]| (field[element], field[element + 1] - field[element]);
+    let ((bend, bend_rise), (slope, slope_rise)) = (rise(&spine.bend), rise(&spine.rib_slope));
+    let constant = bend_rise * (1.0 + slope * slope) + 2.0 * bend * slope * slope_rise;
+    let linear = 2.0 * slope_rise * (2.0 * bend_rise * slope + bend * slope_rise);
+    let square = 3.0 * bend_rise * slope_rise * slope_rise;
+    // The larger of the two sums keeps the digits of both roots.
+    let root = (linear * linear - 4.0 * square * constant).sqrt();
+    let sum = -0.5 * (linear + root.copysign(linear));
+    let shares = [sum / square, constant / sum].into_iter();
+    shares
+        .filter(|share| 0.0 < *share && *share < 1.0)
+        .map(|share| share * spine.element_length(element))
+        .collect()
 }
 
 /// Samples in each smooth piece from which the tightest bend is refined, a number.
@@ -131,14 +186,14 @@ pub fn least_bend_radius(spine: &Spine) -> Option<BendRadius> {
 
 /// A part of an element, by distances from its first node.
 #[derive(Clone, Copy)]
-struct Part {
-    element: usize,
-    from: f64,
-    to: f64,
+pub(super) struct Part {
+    pub(super) element: usize,
+    pub(super) from: f64,
+    pub(super) to: f64,
 }
 
 /// The parts of an element between the ribs through the board's vertices, where the ribs' ends change lines.
-fn smooth_parts(spine: &Spine, board: &Board, element: usize) -> Vec<Part> {
+pub(super) fn smooth_parts(spine: &Spine, board: &Board, element: usize) -> Vec<Part> {
     let mut cuts = board.vertex_ribs(spine, element);
     cuts.insert(0, 0.0);
     cuts.push(spine.element_length(element));
@@ -239,6 +294,32 @@ mod tests {
             least_spine_radius(&spine(1.0, 0.1, 40, |_| 0.0, |_| 0.5)),
             None
         );
+    }
+
+    #[test]
+    fn test_tightest_bend_of_the_spine_is_found_between_nodes() {
+        // ω (1 + β²) = (2 − u)(1 + 25 u²) in one element has its maximum where 25 (4u − 3u²) = 1 a second time.
+        let spine = spine(1.0, 0.1, 1, |u| 2.0 - u, |u| 5.0 * u);
+        let least = least_spine_radius(&spine).unwrap();
+        assert_eq!(least.u, 1.0);
+        let spine = self::spine(1.9, 0.1, 1, |u| 2.0 - u, |u| 5.0 * u);
+        let least = least_spine_radius(&spine).unwrap();
+        let u = (2.0 + (4.0f64 - 3.0 / 25.0).sqrt()) / 3.0;
+        assert_relative_eq!(least.u, u, epsilon = 1e-13);
+        let expected = 1.0 / ((2.0 - u) * (1.0 + 25.0 * u * u));
+        assert_relative_eq!(least.value, expected, epsilon = 1e-13);
+    }
+
+    #[test]
+    fn test_tightest_bend_of_the_spine_is_placed_between_equal_nodes() {
+        let hump = |u: f64| 3.0 - 8.0 * (u - 0.43).powi(2);
+        for n in [7, 9, 20] {
+            let least = least_spine_radius(&spine(1.0, 0.1, n, hump, |_| 0.0)).unwrap();
+            assert_relative_eq!(least.u, 0.43, epsilon = 1e-13);
+            let tent = |u: f64| 1.0 - (u - 1.0).abs();
+            let peak = least_spine_radius(&spine(2.0, 0.1, 2 * n, tent, |_| 0.0)).unwrap();
+            assert_eq!((peak.u, peak.value), (1.0, 1.0));
+        }
     }
 
     #[test]
@@ -362,6 +443,17 @@ mod tests {
             let top = highest_point(&spine, &direction).position.dot(&direction);
             for i in 0..=1000 {
                 prop_assert!(spine.at(f64::from(i) / 1000.0).pose.position.dot(&direction) <= top + 1e-9);
+            }
+        }
+
+        #[test]
+        fn test_no_sampled_bend_of_the_spine_is_tighter((bend, slope) in waves(15.0)) {
+            let spine = spine(1.0, 0.1, 12, |u| bend.at(u), |u| slope.at(u));
+            let least = least_spine_radius(&spine).map_or(0.0, |radius| radius.value);
+            for i in 0..=1200 {
+                let point = spine.at(f64::from(i) / 1200.0);
+                let sampled = 1.0 / curvature(point.bend, point.rib_slope).abs();
+                prop_assert!(sampled >= least * (1.0 - 1e-12));
             }
         }
 

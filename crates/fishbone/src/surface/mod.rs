@@ -5,6 +5,7 @@
 //! out in [`crate::board`].
 
 mod curvature;
+mod distribution;
 mod extremes;
 pub mod linking;
 mod locate;
@@ -14,6 +15,7 @@ mod rib;
 mod self_crossing;
 
 pub use curvature::*;
+pub use distribution::*;
 pub use extremes::*;
 pub use mesh::*;
 pub use rib::*;

@@ -1,0 +1,107 @@
+//! Warnings to read before a result is relied on.
+
+use super::{Equilibrium, Status};
+use crate::problem::number;
+use crate::scenario::BeltSpec;
+use crate::surface;
+
+impl Equilibrium {
+    /// Warnings to read before the result is relied on, one line each.
+    pub fn warnings(&self) -> Vec<String> {
+        self.warnings_with(surface::crosses_itself(&self.spine))
+    }
+
+    /// The warnings, where the self-crossing is known.
+    pub(crate) fn warnings_with(&self, crossing: Option<[f64; 2]>) -> Vec<String> {
+        let crossing = crossing.filter(|_| self.status == Status::Converged);
+        let scales = implausible_scales(&self.scenario().belt);
+        let solve = self.warnings.iter().cloned();
+        solve.chain(scales).chain(crossing.map(crossed)).collect()
+    }
+}
+
+fn crossed([a, b]: [f64; 2]) -> String {
+    format!(
+        "the belt crosses itself at u = {} and u = {}: contact is outside the model",
+        number(a),
+        number(b)
+    )
+}
+
+/// The warning of lengths that are hardly metres, of a belt whose material is in SI units.
+fn implausible_scales(belt: &BeltSpec) -> Option<String> {
+    /// Length from which a belt is longer than the belts that are made of thin sheets. Units: m.
+    const LONG: f64 = 5.0;
+    /// Force scale R_f/U² from which a belt is stiffer than thin sheets are. Units: N.
+    const STIFF: f64 = 1e3;
+    let rigidity = belt.own_rigidity().filter(|_| belt.is_in_si_units())?;
+    let length = belt.length();
+    let force = rigidity / (length * length);
+    (length > LONG || force > STIFF).then(|| {
+        format!(
+            "the material is in SI units, and so the belt is {} m long and its force scale R_f/U² is {force:.1e} N: lengths \
+             are in metres, perhaps millimetres were meant",
+            number(length)
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::{LayerSpec, MaterialSpec, SegmentSpec};
+
+    fn belt(unit: f64, young: Option<f64>, preset: Option<&str>) -> BeltSpec {
+        let mut belt = BeltSpec::new(8.0 * unit, 1.0, vec![SegmentSpec::straight(60.0 * unit)]);
+        belt.rigidity = None;
+        belt.material = Some(MaterialSpec {
+            preset: preset.map(str::to_owned),
+            young,
+            poisson: Some(0.3),
+            thickness: 0.1 * unit,
+            density: None,
+        });
+        belt
+    }
+
+    #[test]
+    fn test_lengths_in_millimetres_are_warned_of_where_the_material_is_in_pascal() {
+        for (young, preset) in [
+            (None, Some("polyimide")),
+            (Some(3e9), None),
+            (Some(7e6), None),
+        ] {
+            assert_eq!(implausible_scales(&belt(1e-3, young, preset)), None);
+            let warning = implausible_scales(&belt(1.0, young, preset)).unwrap();
+            assert!(warning.contains("60 m long") && warning.contains("millimetres"));
+        }
+    }
+
+    #[test]
+    fn test_short_belts_in_millimetres_are_known_by_their_forces() {
+        let mut short = belt(1.0, None, Some("polyimide"));
+        short.segments = vec![SegmentSpec::straight(4.0)];
+        let warning = implausible_scales(&short).unwrap();
+        // E t³ V/(12 (1 − ν²) U²), E = 2.5e9 or more
+        assert!(warning.contains("force scale R_f/U² is 1."), "{warning}");
+    }
+
+    #[test]
+    fn test_units_of_other_belts_are_not_known() {
+        // Newton and millimetre: the modulus is in MPa.
+        assert_eq!(implausible_scales(&belt(1.0, Some(2e5), None)), None);
+        let plain = BeltSpec::new(8.0, 1e9, vec![SegmentSpec::straight(60.0)]);
+        assert_eq!(implausible_scales(&plain), None);
+    }
+
+    #[test]
+    fn test_layers_are_in_si_units() {
+        let mut belt = belt(1.0, Some(2e5), None);
+        belt.material = None;
+        belt.layers = Some(vec![LayerSpec {
+            material: "polyimide".to_owned(),
+            thickness: 0.1,
+        }]);
+        assert!(implausible_scales(&belt).is_some());
+    }
+}
