@@ -8,6 +8,7 @@ mod stability;
 
 use crate::names::named;
 pub use stability::Stability;
+pub(crate) use stability::left_free;
 
 use crate::geometry::{Pose, Wrench};
 use crate::problem::Problem;

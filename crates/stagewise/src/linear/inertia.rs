@@ -5,6 +5,7 @@
 
 use super::chain::ByControls;
 use super::kkt::Kkt;
+use super::symmetries::{Motions, zero_modes};
 use crate::linearisation::Linearisation;
 use crate::program::{Scales, Values};
 use nalgebra::SMatrix;
@@ -20,8 +21,11 @@ const CLEAR: f64 = 100.0;
 pub struct Inertia {
     /// Number of negative eigenvalues.
     pub negative: usize,
-    /// Number of eigenvalues near zero, of either sign.
+    /// Number of eigenvalues near zero, of either sign, beside the symmetries.
     pub zero: usize,
+    /// Number of independent symmetries of the programme, along which nothing changes; they are in neither of the other
+    /// numbers.
+    pub symmetries: usize,
     /// Number of cost-free controls, along which neither state nor objective changes; they are in neither of the other
     /// numbers.
     pub cost_free: usize,
@@ -35,16 +39,18 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         values: &Values,
         multipliers: &[f64],
         metric: &[SMatrix<f64, X, X>],
+        symmetries: &Motions<N>,
         scales: &Scales,
     ) -> Option<Inertia> {
         let cost_free = self.linear.hold_cost_free_controls();
+        let symmetries = zero_modes(metric, symmetries);
         let zero = ZERO * scales.eigenvalue();
         let clear = |slack: f64, multiplier: f64| multiplier > CLEAR * slack;
         let doubtful = |slack: f64, multiplier: f64| CLEAR * multiplier > slack;
         let mut below = |shift: f64, active: fn(f64, f64) -> bool| {
             self.assemble_where(values, multipliers, active);
             self.shift(metric, shift);
-            self.count_negative().ok()
+            self.count_negative_beside(&symmetries).ok()
         };
         let not_positive = below(zero, clear)?;
         let negative = match not_positive {
@@ -54,7 +60,8 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         let is_in_doubt = not_positive > 0 && below(-zero, doubtful)? != negative;
         (!is_in_doubt).then_some(Inertia {
             negative,
-            zero: not_positive - negative,
+            zero: not_positive.saturating_sub(negative),
+            symmetries: symmetries.len(),
             cost_free,
         })
     }
@@ -145,4 +152,41 @@ impl<const X: usize, const U: usize, const N: usize> Linearisation<X, U, N> {
 /// The larger of each of two numbers.
 fn maxima(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     [a[0].max(b[0]), a[1].max(b[1])]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::layout::Layout;
+    use nalgebra::Vector3;
+
+    /// A chain whose first control moves the state and whose second one costs, by a share of a stage each.
+    fn chain(second: impl Fn(usize) -> f64) -> Linearisation<1, 2, 3> {
+        let stages = 100;
+        let share = 1.0 / stages as f64;
+        let mut linear = Linearisation::new(Layout::new(vec![share; stages]));
+        for (k, stage) in linear.chain.stages.iter_mut().enumerate() {
+            let growth = ByControls::from_columns(&[Vector3::x() * share, Vector3::zeros()]);
+            (stage.growth_by_first, stage.growth_by_second) = (growth, growth);
+            let own = SMatrix::<f64, 2, 2>::new(share, 0.0, 0.0, share * second(k));
+            let controls = &mut linear.diagonal.controls[k];
+            (controls.first, controls.second) = (own, own);
+        }
+        linear
+    }
+
+    #[test]
+    fn test_control_is_cost_free_where_it_changes_nothing_and_only_there() {
+        assert_eq!(chain(|_| 1.0).hold_cost_free_controls(), 0);
+        // The second control of the nodes 0 to 39 changes nothing; a stage beyond is stiffer than the rest by 1e12.
+        let mut linear = chain(|k| match k {
+            0..40 => 1e-12,
+            70 => 1e12,
+            _ => 1.0,
+        });
+        assert_eq!(linear.hold_cost_free_controls(), 40);
+        let free = linear.chain.stages.iter().map(|stage| stage.free);
+        assert!(free.clone().all(|free| free[0]));
+        assert_eq!(free.filter(|free| !free[1]).count(), 39);
+    }
 }

@@ -1,7 +1,7 @@
 //! Settings of the search for all equilibria: its extent, and its tolerances for equal equilibria.
 
 use super::height;
-use crate::analysis::symmetry::{SAME, are_images};
+use crate::analysis::symmetry::{SAME, are_images, are_images_slid};
 use crate::equilibrium::Equilibrium;
 
 /// Extent of the search and its tolerances for equal equilibria; with the defaults it finds all that are known of the
@@ -128,8 +128,13 @@ impl SearchSettings {
         let index = |e: &Equilibrium| e.stability.map(|s| s.negative_modes);
         is_level
             && index(a) == index(b)
-            && solved()
-                .is_some_and(|(a, b)| are_images(&a.at.point.poses, &b.at.point.poses, distance))
+            && solved().is_some_and(|(a, b)| {
+                let [of_a, of_b] = [a, b].map(|solved| &solved.at.point.poses);
+                are_images(of_a, of_b, distance)
+                    || a.program.slides().is_some_and(|half_turns| {
+                        are_images_slid(of_a, of_b, &a.program.nodes(), half_turns, distance)
+                    })
+            })
     }
 
     /// Scale of differences of energy: the bending energy, because the zero of a load's potential is arbitrary; of a flat
