@@ -112,3 +112,49 @@ fn in_frame_of_first<'a>(poses: impl Iterator<Item = &'a Pose> + Clone) -> Vec<P
         .unwrap_or_else(Pose::identity);
     poses.map(|pose| first * *pose).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::exp;
+    use std::f64::consts::PI;
+
+    /// Nodes of an oval of one axis 0.2 and another, with half turns spread out along it, from a place on.
+    fn oval(other_axis: f64, half_turns: i32, from: f64) -> Vec<Pose> {
+        let at = |k: usize| {
+            let place = from + k as f64 / NODES as f64;
+            let (sine, cosine) = (2.0 * PI * place).sin_cos();
+            let tangent = Vector3::new(-0.2 * sine, other_axis * cosine, 0.0).normalize();
+            let level =
+                Matrix3::from_columns(&[tangent.cross(&Vector3::z()), tangent, Vector3::z()]);
+            Pose {
+                frame: level * exp(&(Vector3::y() * (PI * f64::from(half_turns) * place))),
+                position: Vector3::new(0.2 * cosine, other_axis * sine, 0.0),
+            }
+        };
+        (0..=NODES).map(at).collect()
+    }
+
+    /// Elements of a test's belt, a number.
+    const NODES: usize = 80;
+
+    #[test]
+    fn test_closed_belts_are_the_same_wherever_their_seam_is() {
+        let u: Vec<f64> = (0..=NODES).map(|k| k as f64 / NODES as f64).collect();
+        let elsewhere = Pose {
+            frame: exp(&Vector3::new(0.3, -1.0, 0.4)),
+            position: Vector3::new(1.0, 2.0, 3.0),
+        };
+        for half_turns in [0, 1, 3] {
+            let first = oval(0.1, half_turns, 0.0);
+            let moved = |poses: Vec<Pose>| -> Vec<Pose> {
+                poses.into_iter().map(|pose| elsewhere * pose).collect()
+            };
+            let slid = moved(oval(0.1, half_turns, 0.3147));
+            assert!(!are_images(&first, &slid, SAME));
+            assert!(are_images_slid(&first, &slid, &u, half_turns, SAME));
+            let other = moved(oval(0.12, half_turns, 0.3147));
+            assert!(!are_images_slid(&first, &other, &u, half_turns, SAME));
+        }
+    }
+}
