@@ -14,7 +14,7 @@ import pytest
 import fishbone as fb
 from conftest import FEW
 from fishbone.branches import _search
-from helpers import Elastica, spine_at
+from helpers import Elastica, belt, spine_at
 
 SIDES = [np.diag(signs) for signs in ([1, 1, 1], [-1, 1, 1], [1, 1, -1], [-1, 1, -1])]
 """What takes clamps in line to themselves: nothing, two mirrors and half a turn."""
@@ -255,3 +255,13 @@ def test_a_start_may_have_fewer_points_than_the_mesh(arches, arch):
 def test_what_is_no_shape_is_no_start(arch, start, words):
     with pytest.raises(fb.InvalidArgument, match=f"start: .*{words}"):
         fb.solve(arch, start=start)
+
+
+@pytest.mark.full
+def test_shapes_of_a_closed_band_that_differ_by_sliding_are_one() -> None:
+    """The Möbius band, and the band of three half turns: 135.103 by a boundary value solver of its own."""
+    band = belt([], energy="wunderlich", elements=80)
+    band["belt"] |= {"closed": True, "half_turns": 1}
+    found = fb.branches(fb.Scenario.from_dict(band))
+    assert [shape.half_turns for shape in found] == [1, 3]
+    assert found[1].energy == pytest.approx(135.103, rel=2e-3)

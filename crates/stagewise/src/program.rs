@@ -124,6 +124,18 @@ pub trait Program<const X: usize, const U: usize, const N: usize> {
     /// The metric of every node: the squared length of a change of its state, times the node's share in the whole.
     /// Eigenvalues of the second variation are relative to this metric.
     fn metric(&self, point: &Self::Point) -> Vec<SMatrix<f64, X, X>>;
+
+    /// Motions of all nodes, states and controls, along which the programme is known to stay the same, dependent ones among
+    /// them or not: the generators of its symmetries. On the mesh a symmetry of the whole may hold within the error of the
+    /// mesh only; [`Inertia`] and [`lowest_modes`] take it as exact.
+    ///
+    /// By default none.
+    ///
+    /// [`Inertia`]: crate::Inertia
+    /// [`lowest_modes`]: crate::lowest_modes
+    fn symmetries(&self, _point: &Self::Point) -> Vec<Vec<NodeVector<N>>> {
+        Vec::new()
+    }
 }
 
 impl<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> Program<X, U, N> for &P {
@@ -166,6 +178,10 @@ impl<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> Progra
 
     fn metric(&self, point: &Self::Point) -> Vec<SMatrix<f64, X, X>> {
         (*self).metric(point)
+    }
+
+    fn symmetries(&self, point: &Self::Point) -> Vec<Vec<NodeVector<N>>> {
+        (*self).symmetries(point)
     }
 }
 

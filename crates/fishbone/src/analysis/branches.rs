@@ -224,8 +224,8 @@ impl Census<'_> {
         }
     }
 
-    /// Keeps the equilibria that are confirmed on a mesh twice as fine; of equilibria that this mesh does not separate, the
-    /// lowest.
+    /// Keeps the equilibria that are confirmed on a mesh twice as fine; of equilibria that this mesh does not separate, and of
+    /// those that differ by sliding, the lowest.
     fn confirm(&mut self) {
         let mut found = std::mem::take(&mut self.found);
         found.sort_by(|a, b| a.energy.total_cmp(&b.energy));
@@ -241,7 +241,9 @@ impl Census<'_> {
             let change = (fine.energy - found.energy).abs();
             let is_known = |(known, own): &(Equilibrium, f64)| {
                 let is_level = (known.energy - fine.energy).abs() <= change.max(*own);
-                settings.is_same(known, &fine) || (is_level && settings.is_like(known, &fine))
+                settings.is_same(known, &fine)
+                    || settings.is_slid(known, &fine)
+                    || (is_level && settings.is_like(known, &fine))
             };
             if !known.iter().any(is_known) {
                 known.push((fine, change));
@@ -302,13 +304,18 @@ fn on_finer_mesh(
     (is_level && found.displacement(&fine) <= settings.like_distance).then_some(fine)
 }
 
-/// The lowest modes of an equilibrium.
+/// The lowest modes of an equilibrium beside its symmetries, which lead to no other shape.
 fn lowest_modes(equilibrium: &Equilibrium, count: usize) -> Vec<Mode> {
-    let solved = equilibrium.solved.as_ref().filter(|_| count > 0);
-    let modes = solved.and_then(|solved| {
-        stagewise::lowest_modes(&solved.program, &mut solved.at.clone(), count).ok()
-    });
-    modes.unwrap_or_default()
+    let Some(solved) = equilibrium.solved.as_ref().filter(|_| count > 0) else {
+        return Vec::new();
+    };
+    let symmetries = solved.inertia.map_or(0, |inertia| inertia.symmetries);
+    let all = count + symmetries;
+    let modes = stagewise::lowest_modes(&solved.program, &mut solved.at.clone(), all);
+    let mut modes = modes.unwrap_or_default();
+    modes.retain(|mode| mode.eigenvalue != 0.0);
+    modes.truncate(count);
+    modes
 }
 
 /// The minima found from a minimum displaced far along a mode.

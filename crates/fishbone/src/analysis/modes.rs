@@ -1,7 +1,7 @@
 //! Modes: eigenvectors of the second variation of the energy at an equilibrium.
 
 use crate::analysis::sensitivity::Motion;
-use crate::equilibrium::{Equilibrium, Uncertified};
+use crate::equilibrium::{Equilibrium, Uncertified, left_free};
 use crate::names::named;
 use crate::problem::program::DevelopableNode as NodeVector;
 use stagewise::Singular;
@@ -42,14 +42,19 @@ named!(impl NoModes {
 });
 
 impl Equilibrium {
-    /// The lowest modes, rising; fewer than `count` where the mesh has no more.
+    /// The lowest modes, rising; fewer than `count` where the mesh has no more. Motions that change nothing, of the whole
+    /// belt or of a uniform closed belt along itself, have the eigenvalue 0.
     ///
     /// # Errors
     ///
     /// [`NoModes`] unless the solve has converged.
     pub fn modes(&self, count: usize) -> Result<Vec<Mode>, NoModes> {
         let solved = self.certified()?;
-        let modes = stagewise::lowest_modes(&solved.program, &mut solved.at.clone(), count);
+        let (program, mut at) = match left_free(&self.problem, &solved.program, &solved.at) {
+            Some(free) => free,
+            None => (solved.program.clone(), solved.at.clone()),
+        };
+        let modes = stagewise::lowest_modes(&program, &mut at, count);
         let units = self.problem.units();
         let length = units.length;
         let of_node = |node: usize, motion: &NodeVector| {

@@ -135,7 +135,9 @@ impl Equilibrium {
             scales: Scales::new(&self.problem, &solved.program),
             nodes: solved.at.point.poses.len(),
         };
-        let is_strict = solved.inertia.is_some_and(|inertia| inertia.zero == 0);
+        let is_strict = solved
+            .inertia
+            .is_some_and(|inertia| inertia.zero + inertia.symmetries == 0);
         match is_strict || sensitivity.is_held() {
             true => Ok(sensitivity),
             false => Err(NoSensitivity::Marginal),

@@ -2,7 +2,7 @@
 
 use super::active_set::settle;
 use super::search::{MinimumSettings, Search, is_flat_under_load};
-use super::stability::Stability;
+use super::stability::{self, Stability};
 use super::{Equilibrium, LinkForce, Reaction, Solved, Start, Status};
 use crate::equilibrium::guess::{disturb, guess};
 use crate::problem::program::{self, BeltPoint, BeltProgram, ROWS};
@@ -65,13 +65,15 @@ fn equilibrium(
     redundant: Option<String>,
 ) -> Equilibrium {
     let (scenario, units) = (problem.scenario(), problem.units());
+    let solution = stability::with_square_ribs(problem, &program, solution);
     let spine = problem.spine(&program, &solution.at.point);
     let half_turns = match status {
         Status::Converged => half_turns(&spine),
         Status::Infeasible | Status::NotConverged => None,
     };
     let internal = program.internal(&solution.at.point, &solution.at.multipliers.equalities);
-    let stability = stability(status, solution.inertia, &internal);
+    let inertia = stability::inertia(problem, &program, &solution);
+    let stability = stability(status, inertia, &internal);
     let links = program
         .link_forces(&solution.at.multipliers.equalities)
         .into_iter();
@@ -360,7 +362,8 @@ fn stability(
     let is_open = inertia.cost_free > 0 && is_stressed && inertia.negative == 0;
     (!is_open).then_some(Stability {
         negative_modes: inertia.negative,
-        zero_modes: inertia.zero,
+        zero_modes: inertia.zero + inertia.symmetries,
+        symmetries: inertia.symmetries,
     })
 }
 

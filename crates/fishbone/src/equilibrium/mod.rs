@@ -9,6 +9,7 @@ mod warnings;
 
 use crate::names::named;
 pub use stability::Stability;
+pub(crate) use stability::left_free;
 
 use crate::geometry::{Pose, Wrench};
 use crate::problem::Problem;

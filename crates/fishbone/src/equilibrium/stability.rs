@@ -1,6 +1,9 @@
 //! Stability of an equilibrium by the second variation of the energy.
 
 use super::Equilibrium;
+use crate::problem::Problem;
+use crate::problem::program::{BeltPoint, BeltProgram, ROWS};
+use stagewise::{Inertia, Outcome, Solution, Stationary, assess};
 
 /// The inertia of the second variation of the energy at an equilibrium, on the shapes that its supports and its active rib
 /// bounds leave free.
@@ -10,12 +13,16 @@ pub struct Stability {
     pub negative_modes: usize,
     /// Number of independent directions in which the energy is constant to second order.
     pub zero_modes: usize,
+    /// Number of zero modes that change nothing at any order: motions of the whole belt that its supports leave, and of a
+    /// uniform closed belt along itself.
+    pub symmetries: usize,
 }
 
 impl Stability {
-    /// Whether the equilibrium is a local minimum; `None` where a direction of zero second variation leaves the answer open.
+    /// Whether the equilibrium is a local minimum but for its symmetries; `None` where another direction of zero second
+    /// variation leaves the answer open.
     pub(crate) fn is_stable(&self) -> Option<bool> {
-        match (self.negative_modes, self.zero_modes) {
+        match (self.negative_modes, self.zero_modes - self.symmetries) {
             (0, 0) => Some(true),
             (0, _) => None,
             _ => Some(false),
@@ -28,4 +35,61 @@ impl Equilibrium {
     pub fn stable(&self) -> Option<bool> {
         self.stability?.is_stable()
     }
+}
+
+/// A solution with square ribs in place of its own where the belt is flat all along: the slope of these ribs costs nothing,
+/// and bends across slanted ribs are stiffer than across square ones.
+pub(super) fn with_square_ribs(
+    problem: &Problem,
+    program: &BeltProgram,
+    solution: Solution<BeltPoint>,
+) -> Solution<BeltPoint> {
+    /// Bend up to which a node is flat, in 1/U.
+    const FLAT: f64 = 1e-9;
+    let mut at = solution.at.clone();
+    let is_flat = at.point.fields.iter().all(|fields| fields[0].abs() <= FLAT);
+    if !is_flat || solution.outcome != Outcome::Converged {
+        return solution;
+    }
+    for fields in &mut at.point.fields {
+        fields[1] = 0.0;
+    }
+    program.settle(&mut at.point);
+    if program.least_slack(&at.point) <= 0.0 {
+        return solution;
+    }
+    let square = assess(program, problem.tolerance(), &at).after(solution.iterations);
+    match square.outcome {
+        Outcome::Converged => square,
+        _ => solution,
+    }
+}
+
+/// The inertia of a solution of a problem's programme, on all motions that its scenario leaves.
+pub(super) fn inertia(
+    problem: &Problem,
+    program: &BeltProgram,
+    solution: &Solution<BeltPoint>,
+) -> Option<Inertia> {
+    match left_free(problem, program, &solution.at) {
+        Some((program, at)) => assess(&program, problem.tolerance(), &at).inertia,
+        None => solution.inertia,
+    }
+}
+
+/// The programme and its solution without the support at rest, if nothing else holds or loads the belt: that support only
+/// chooses one of equal poses, and bears nothing.
+pub(crate) fn left_free(
+    problem: &Problem,
+    program: &BeltProgram,
+    at: &Stationary<BeltPoint>,
+) -> Option<(BeltProgram, Stationary<BeltPoint>)> {
+    let scenario = problem.scenario();
+    let is_held = !scenario.supports.is_empty() || !scenario.links.is_empty();
+    if is_held || program.is_loaded() {
+        return None;
+    }
+    let mut at = at.clone();
+    at.multipliers.equalities.drain(..ROWS);
+    Some((program.clone().with_supports(Vec::new()), at))
 }

@@ -10,6 +10,7 @@ mod load;
 mod obstacle;
 mod piece;
 mod support;
+mod symmetries;
 #[cfg(test)]
 mod tests;
 

@@ -130,9 +130,15 @@ impl<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> Primal
     /// Inertia of the second variation. Overwrites the derivatives.
     pub(crate) fn inertia(&mut self) -> Option<Inertia> {
         let metric = self.program.metric(&self.point);
+        let symmetries = self.program.symmetries(&self.point);
         let multipliers = &self.multipliers.inequalities;
-        self.kkt
-            .inertia(&self.values, multipliers, &metric, &self.scales)
+        self.kkt.inertia(
+            &self.values,
+            multipliers,
+            &metric,
+            &symmetries,
+            &self.scales,
+        )
     }
 
     /// Newton step of the barrier problem.

@@ -10,10 +10,10 @@ mod pair_matrix;
 mod rank;
 mod response;
 mod small;
+mod symmetries;
 
 pub use inertia::Inertia;
 pub(crate) use kkt::Kkt;
-pub(crate) use modes::lowest_modes_of;
 pub use modes::{Mode, lowest_modes, moved};
 pub use pair_matrix::{PairMatrix, StageMatrix};
 pub use rank::redundant_equalities;

@@ -2,6 +2,7 @@
 
 use super::chain::NodeVector;
 use super::response::{Response, Singular};
+use super::symmetries::{Held, Motions, products, zero_modes};
 use crate::program::{Program, Scales, Stationary};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
@@ -18,7 +19,8 @@ pub struct Mode<const N: usize> {
 
 /// The lowest modes at a solution, rising; fewer than `count` where the programme has fewer.
 ///
-/// By subspace iteration with the inverse of the second variation, shifted below all eigenvalues.
+/// The symmetries of the programme are modes of eigenvalue 0, and the others are square to them. By subspace iteration with
+/// the inverse of the second variation, shifted below all eigenvalues.
 ///
 /// Errors: [`Singular`] where the shifted second variation cannot be factorised.
 pub fn lowest_modes<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>(
@@ -26,14 +28,21 @@ pub fn lowest_modes<P: Program<X, U, N>, const X: usize, const U: usize, const N
     at: &mut Stationary<P::Point>,
     count: usize,
 ) -> Result<Vec<Mode<N>>, Singular> {
-    let response = Response::of_stationary(program, at)?;
-    lowest_modes_of(response, &program.scales(), count)
+    let mut response = Response::unfactorised(program, at)?;
+    let shift = shift_below_all(&mut response, &program.scales())?;
+    let mut modes = zero_modes(response.metric(), &program.symmetries(&at.point));
+    let beside = lowest_beside(&modes, &mut response, shift, count)?;
+    modes.extend(beside);
+    modes.sort_by(|a, b| a.eigenvalue.total_cmp(&b.eigenvalue));
+    modes.truncate(count);
+    Ok(modes)
 }
 
-/// The lowest modes of a factorised system.
-pub(crate) fn lowest_modes_of<const X: usize, const U: usize, const N: usize>(
-    mut response: Response<X, U, N>,
-    scales: &Scales,
+/// The lowest modes of a shifted system square to given ones, rising.
+fn lowest_beside<const X: usize, const U: usize, const N: usize>(
+    given: &[Mode<N>],
+    response: &mut Response<X, U, N>,
+    shift: f64,
     count: usize,
 ) -> Result<Vec<Mode<N>>, Singular> {
     /// Count of guard vectors beyond the modes that are sought; a number.
@@ -41,14 +50,15 @@ pub(crate) fn lowest_modes_of<const X: usize, const U: usize, const N: usize>(
     /// Largest count of subspace iterations; a number.
     const ITERATIONS: usize = 100;
     /// Relative change of shifted eigenvalues at which the iteration has converged; dimensionless.
-    const CONVERGED: f64 = 1e-12;
-    let shift = shift_below_all(&mut response, scales)?;
-    let mut subspace = first_guess(&response, count + GUARDS);
+    const CONVERGED: f64 = 1e-10;
+    let held = Held::new(given, response)?;
+    let mut subspace = first_guess(response, count + GUARDS);
     let mut last = vec![f64::INFINITY; count];
     for _ in 0..ITERATIONS {
-        let forces: Vec<_> = subspace.iter().map(|mode| mode.force.clone()).collect();
-        let motions = answers(&mut response, &forces)?;
-        subspace = ritz(&response, &motions, &forces, shift);
+        let forces: Motions<N> = subspace.iter().map(|mode| mode.force.clone()).collect();
+        let mut motions = response.answers(&forces)?;
+        motions.iter_mut().for_each(|motion| held.project(motion));
+        subspace = ritz(response, &motions, &forces, shift);
         let now: Vec<f64> = subspace
             .iter()
             .take(count)
@@ -127,43 +137,21 @@ fn first_guess<const X: usize, const U: usize, const N: usize>(
     (0..count).map(guess).collect()
 }
 
-/// Several motions, each of all nodes.
-type Motions<const N: usize> = Vec<Vec<NodeVector<N>>>;
-
-/// Solutions of the system under forces.
-fn answers<const X: usize, const U: usize, const N: usize>(
-    response: &mut Response<X, U, N>,
-    forces: &[Vec<NodeVector<N>>],
-) -> Result<Motions<N>, Singular> {
-    let mut answer = |force: &Vec<NodeVector<N>>| {
-        let mut right = response.zero();
-        for (right, force) in right.nodes.iter_mut().zip(force) {
-            *right = -force;
-        }
-        Ok(response.solve(&right)?.nodes)
-    };
-    forces.iter().map(&mut answer).collect()
-}
-
 /// Ritz approximations of modes in the span of motions, each the solution under a known force.
 fn ritz<const X: usize, const U: usize, const N: usize>(
     response: &Response<X, U, N>,
-    motions: &[Vec<NodeVector<N>>],
-    forces: &[Vec<NodeVector<N>>],
+    motions: &Motions<N>,
+    forces: &Motions<N>,
     shift: f64,
 ) -> Vec<Mode<N>> {
     /// Eigenvalue of the scaled mass matrix below which motions depend on each other; dimensionless.
     const DEPENDENT: f64 = 1e-14;
-    let own: Vec<_> = motions
+    let own: Motions<N> = motions
         .iter()
         .map(|motion| response.force(motion))
         .collect();
     let count = motions.len();
-    let products = |with: &[Vec<NodeVector<N>>]| {
-        let product = DMatrix::from_fn(count, count, |i, j| dot(&motions[i], &with[j]));
-        0.5 * (&product + product.transpose())
-    };
-    let (stiffness, mass) = (products(forces), products(&own));
+    let (stiffness, mass) = (products(motions, forces), products(motions, &own));
     // To coordinates of unit mass first, without dependent motions.
     let scale = DVector::from_fn(count, |i, _| {
         mass[(i, i)].max(f64::MIN_POSITIVE).sqrt().recip()
@@ -193,7 +181,7 @@ fn ritz<const X: usize, const U: usize, const N: usize>(
     order.into_iter().map(mode).collect()
 }
 
-fn combine<const N: usize>(
+pub(super) fn combine<const N: usize>(
     motions: &[Vec<NodeVector<N>>],
     factors: impl Iterator<Item = f64>,
 ) -> Vec<NodeVector<N>> {

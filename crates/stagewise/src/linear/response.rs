@@ -3,6 +3,7 @@
 use super::TooConcave;
 use super::chain::NodeVector;
 use super::kkt::Kkt;
+use super::symmetries::{Motions, force_of};
 use crate::layout::Layout;
 use crate::linearisation::Linearisation;
 use crate::program::{Program, Stationary, Values};
@@ -75,9 +76,18 @@ impl<const X: usize, const U: usize, const N: usize> Response<X, U, N> {
         program: &P,
         at: &mut Stationary<P::Point>,
     ) -> Result<Self, Singular> {
+        let mut response = Self::unfactorised(program, at)?;
+        response.refactorise()?;
+        Ok(response)
+    }
+
+    /// The system at a stationary point, with the cost-free controls held; not factorised yet.
+    pub(super) fn unfactorised<P: Program<X, U, N>>(
+        program: &P,
+        at: &mut Stationary<P::Point>,
+    ) -> Result<Self, Singular> {
         let mut response = Self::evaluate(program, at)?;
         response.kkt.linear.hold_cost_free_controls();
-        response.refactorise()?;
         Ok(response)
     }
 
@@ -218,16 +228,14 @@ impl<const X: usize, const U: usize, const N: usize> Response<X, U, N> {
         Ok(self.negative)
     }
 
+    /// The metric of every node.
+    pub(super) fn metric(&self) -> &[SMatrix<f64, X, X>] {
+        &self.metric
+    }
+
     /// The force of the metric on motions: its product with them.
     pub(crate) fn force(&self, motion: &[NodeVector<N>]) -> Vec<NodeVector<N>> {
-        let force = |(metric, motion): (&SMatrix<f64, X, X>, &NodeVector<N>)| {
-            let mut force = NodeVector::<N>::zeros();
-            force
-                .fixed_rows_mut::<X>(0)
-                .copy_from(&(metric * motion.fixed_rows::<X>(0)));
-            force
-        };
-        self.metric.iter().zip(motion).map(force).collect()
+        force_of(&self.metric, motion)
     }
 
     /// Force of the metric with the squares of the slack rates added: a motion of small states may have large slack rates.
@@ -264,6 +272,20 @@ impl<const X: usize, const U: usize, const N: usize> Response<X, U, N> {
             true => Ok(found),
             false => Err(Singular),
         }
+    }
+
+    /// The motions that answer forces.
+    ///
+    /// Errors: [`Singular`] as [`Self::solve`].
+    pub(super) fn answers(&mut self, forces: &Motions<N>) -> Result<Motions<N>, Singular> {
+        let mut answer = |force: &Vec<NodeVector<N>>| {
+            let mut right = self.zero();
+            for (right, force) in right.nodes.iter_mut().zip(force) {
+                *right = -force;
+            }
+            Ok(self.solve(&right)?.nodes)
+        };
+        forces.iter().map(&mut answer).collect()
     }
 
     /// Solves a system that may be nearly singular, for an approximation that a later iteration corrects.

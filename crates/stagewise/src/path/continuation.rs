@@ -10,7 +10,7 @@ use super::curve::{Curve, End, Event, Events, Pace, Station, Turn};
 use super::family::{Alone, Family};
 use crate::interior_point::{Settings, Solution, assess, minimise};
 use crate::linear::modes::dot;
-use crate::linear::{Mode, Response, lowest_modes_of, moved};
+use crate::linear::{Mode, Response, lowest_modes, moved};
 use crate::program::{Distance, Program, Stationary};
 use std::ops::ControlFlow;
 
@@ -173,8 +173,7 @@ impl<'a, F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
     /// The lowest modes at a station.
     pub fn modes(&self, station: &Station<F::Point, N>, count: usize) -> Option<Vec<Mode<N>>> {
         let program = self.family.at(station.parameter)?;
-        let response = Response::of_stationary(&program, &mut station.at.clone()).ok()?;
-        lowest_modes_of(response, &program.scales(), count).ok()
+        lowest_modes(&program, &mut station.at.clone(), count).ok()
     }
 
     /// The next station, and the event between the two stations; adapts the length of the step.

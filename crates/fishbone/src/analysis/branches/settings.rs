@@ -1,8 +1,8 @@
 //! Settings of the search for all equilibria: its extent, and its tolerances for equal equilibria.
 
 use super::height;
-use crate::analysis::symmetry::{SAME, are_images};
-use crate::equilibrium::Equilibrium;
+use crate::analysis::symmetry::{SAME, are_images, are_images_slid};
+use crate::equilibrium::{Equilibrium, Solved};
 
 /// Extent of the search and its tolerances for equal equilibria; with the defaults it finds all that are known of the
 /// scenarios tried.
@@ -123,13 +123,33 @@ impl SearchSettings {
         share: f64,
         distance: f64,
     ) -> bool {
-        let solved = || Some((a.solved.as_ref()?, b.solved.as_ref()?));
-        let is_level = (a.energy - b.energy).abs() <= share * self.size(a).max(self.size(b));
+        self.is_level(a, b, share)
+            && solved(a, b)
+                .is_some_and(|[a, b]| are_images(&a.at.point.poses, &b.at.point.poses, distance))
+    }
+
+    /// Whether two equilibria are the same but for a symmetry and for sliding along themselves.
+    pub(super) fn is_slid(&self, a: &Equilibrium, b: &Equilibrium) -> bool {
+        let is_slid = |[a, b]: [&Solved; 2]| {
+            let half_turns = a.program.slides()?;
+            let [of_a, of_b] = [a, b].map(|solved| &solved.at.point.poses);
+            let u = a.program.nodes();
+            Some(are_images_slid(
+                of_a,
+                of_b,
+                &u,
+                half_turns,
+                self.same_distance,
+            ))
+        };
+        self.is_level(a, b, self.same_level) && solved(a, b).and_then(is_slid) == Some(true)
+    }
+
+    /// Whether two equilibria differ by no more than a share of the energy, and in no number of negative modes.
+    fn is_level(&self, a: &Equilibrium, b: &Equilibrium, share: f64) -> bool {
         let index = |e: &Equilibrium| e.stability.map(|s| s.negative_modes);
-        is_level
-            && index(a) == index(b)
-            && solved()
-                .is_some_and(|(a, b)| are_images(&a.at.point.poses, &b.at.point.poses, distance))
+        let most = share * self.size(a).max(self.size(b));
+        (a.energy - b.energy).abs() <= most && index(a) == index(b)
     }
 
     /// Scale of differences of energy: the bending energy, because the zero of a load's potential is arbitrary; of a flat
@@ -143,4 +163,9 @@ impl SearchSettings {
     pub(super) fn is_higher(&self, one: &Equilibrium, other: &Equilibrium) -> bool {
         height(one) > height(other) + self.higher * one.spine.length()
     }
+}
+
+/// The solutions of two equilibria, if both have one.
+fn solved<'a>(a: &'a Equilibrium, b: &'a Equilibrium) -> Option<[&'a Solved; 2]> {
+    Some([a.solved.as_ref()?, b.solved.as_ref()?])
 }

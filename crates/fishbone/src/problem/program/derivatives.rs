@@ -149,6 +149,10 @@ impl<D: Density<F>, const F: usize, const N: usize> Program<6, F, N> for BeltPro
         };
         point.poses.iter().enumerate().map(of_node).collect()
     }
+
+    fn symmetries(&self, point: &BeltPoint<F>) -> Vec<Vec<NodeVector<N>>> {
+        self.find_symmetries(point)
+    }
 }
 
 impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {

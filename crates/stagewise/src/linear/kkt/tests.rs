@@ -1,6 +1,7 @@
 //! The step and the inertia of a system with constraints of every kind, against dense matrices.
 
 use super::*;
+use crate::linear::modes::Mode;
 use nalgebra::{DMatrix, DVector, SVector, SymmetricEigen};
 use proptest::prelude::*;
 
@@ -106,6 +107,19 @@ impl Dense {
         }
     }
 
+    /// Adds the equality that no step works against a force.
+    fn hold(&mut self, force: &[Node]) {
+        let work = |step: &Vec<Node>| step.iter().zip(force).map(|(a, b)| a.dot(b)).sum();
+        let row = self.steps.iter().map(work);
+        let rows = self.equalities.nrows();
+        let mut more = self.equalities.clone().insert_row(rows, 0.0);
+        more.row_mut(rows)
+            .iter_mut()
+            .zip(row)
+            .for_each(|(entry, work): (&mut f64, f64)| *entry = work);
+        self.equalities = more;
+    }
+
     /// Eigenvalues on the directions that the equalities leave.
     fn eigenvalues(&self) -> Vec<f64> {
         let gram = SymmetricEigen::new(self.equalities.tr_mul(&self.equalities));
@@ -136,6 +150,20 @@ impl Dense {
             }
         }
         (nodes, found.as_slice()[n..].to_vec())
+    }
+}
+
+/// A motion of unit metric; its controls have no part in the force.
+fn motion_in_general_position(nodes: usize, seed: usize) -> Mode<3> {
+    let at = |node: usize| {
+        let part = |i: usize| ((1 + seed) as f64 * (0.7 * node as f64 + i as f64)).sin();
+        Node::new(part(0), part(1), 0.0)
+    };
+    let motion: Vec<Node> = (0..nodes).map(at).collect();
+    Mode {
+        eigenvalue: 0.0,
+        force: motion.clone(),
+        motion,
     }
 }
 
@@ -183,6 +211,16 @@ proptest! {
                 prop_assert!((found - exact).abs() < 1e-5 * size || !is_convex);
             }
         }
+        // To hold two motions is to add two equalities to the dense matrices.
+        let held = [0, 1].map(|i| motion_in_general_position(kkt.layout().nodes(), i));
+        let mut stricter = dense;
+        for mode in &held {
+            stricter.hold(&mode.force);
+        }
+        let beside = stricter.eigenvalues();
+        prop_assume!(beside.iter().all(|value| value.abs() > 1e-2));
+        let negative_beside = beside.iter().filter(|value| **value < 0.0).count();
+        prop_assert!(kkt.count_negative_beside(&held) == Ok(negative_beside) || !is_convex);
         // Multipliers of this factorisation are left to refinement: the springs are stiff in it too.
         prop_assert_eq!(kkt.factorise_exactly(), Ok(negative));
         kkt.find_step(&gradient, &targets);
