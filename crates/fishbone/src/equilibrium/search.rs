@@ -142,7 +142,7 @@ impl Search {
     /// Searches from the guess, then from other starts, until a minimum is found; if none is, the best end.
     fn cold(&self, program: &BeltProgram, proceed: &mut Proceed) -> Solution<BeltPoint> {
         let start = match program.half_turns {
-            None => guess(program, &self.bulge),
+            None => self.through_supports(program, proceed),
             Some(half_turns) => self.twisted_up(program, half_turns, proceed),
         };
         let mut best = self.minimise(program, start.clone(), self.settings.cold_barrier, proceed);
@@ -220,7 +220,7 @@ impl Search {
         .after(iterations)
     }
 
-    fn minimise(
+    pub(super) fn minimise(
         &self,
         program: &BeltProgram,
         start: BeltPoint,

@@ -198,11 +198,13 @@ impl<'a, P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>
                 self.filter.clear();
             }
             self.iterate.assemble();
-            if self.iterate.kkt.factorise().is_err() {
+            let is_convex = self.iterate.kkt.factorise().is_ok();
+            if !is_convex
+                && violation(&self.layout, &self.iterate.values) <= self.settings.tolerance
+            {
                 return Outcome::Unbounded;
             }
-            self.iterate.find_step();
-            if !self.search()
+            if !(is_convex && self.descends())
                 && let Some(outcome) = self.recover(proceed)
             {
                 return outcome;
@@ -210,6 +212,12 @@ impl<'a, P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>
             self.iterate.linearise();
             self.iteration += 1;
         }
+    }
+
+    /// Goes along the Newton step as far as the filter accepts; false where no length is accepted.
+    fn descends(&mut self) -> bool {
+        self.iterate.find_step();
+        self.search()
     }
 
     /// Whether the caller has interrupted, now or before.

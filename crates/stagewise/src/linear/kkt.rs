@@ -17,10 +17,10 @@ mod tests;
 use super::TooConcave;
 use super::border::{Border, Row};
 use super::chain::{Diagonal, Factor, NodeMatrix, NodeVector};
-use crate::larger;
 use crate::layout::{Block, Layout};
 use crate::linearisation::{Linearisation, product};
 use crate::program::{Multipliers, Program, Values};
+use crate::{larger, largest};
 use nalgebra::SMatrix;
 use std::ops::Range;
 
@@ -28,6 +28,9 @@ use std::ops::Range;
 const COMPLIANCE: f64 = 1e-7;
 /// Largest count of refinements by which springs become rigid; a number.
 const REFINEMENTS: usize = 2;
+/// Residual of the linearised equalities after the refinements above which the springs are too soft beside the chain, and
+/// the equalities become rows of a border; a share of their targets.
+const SOFT: f64 = 1e-3;
 /// Residual of the linearised equalities that is rounding; in the unit of the equalities.
 const EXACT: f64 = 1e-12;
 
@@ -250,9 +253,7 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
     /// Errors: [`TooConcave`] where the chain has a direction of zero curvature.
     pub(crate) fn factorise_exactly(&mut self) -> Result<usize, TooConcave> {
         let concave = self.factorise_chain()? + self.border.concave_rows();
-        let mut border = self.all_rows();
-        let held = border.factorise(&self.linear.chain, &mut self.factor, 0.0)?;
-        self.exact = Some(border);
+        let held = self.hold_exactly()?;
         Ok(concave.saturating_sub(held))
     }
 
@@ -323,6 +324,15 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
             self.exact = Some(border);
             return;
         }
+        let missing = self.find_soft_step(gradient, targets);
+        let at_nodes = &targets[..self.layout().equalities_at_nodes()];
+        if missing > SOFT * largest(at_nodes.iter()) && self.hold_exactly().is_ok() {
+            self.find_step(gradient, targets);
+        }
+    }
+
+    /// Finds the step with the equalities at nodes as springs; gives the largest residual of these equalities.
+    pub(crate) fn find_soft_step(&mut self, gradient: &[NodeVector<N>], targets: &[f64]) -> f64 {
         let at_nodes = self.layout().equalities_at_nodes();
         let (targets_at, targets_between) = targets.split_at(at_nodes);
         self.right.copy_from_slice(gradient);
@@ -337,7 +347,7 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         for _ in 0..REFINEMENTS {
             let most = self.take_missing_at_nodes(targets_at);
             if most <= EXACT && self.border.rows.is_empty() {
-                return;
+                return most;
             }
             self.pull_again_at_nodes(targets_at);
             self.linear
@@ -350,7 +360,15 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
                 *step += correction;
             }
         }
-        self.take_missing_at_nodes(targets_at);
+        self.take_missing_at_nodes(targets_at)
+    }
+
+    /// Factorises the equalities as rows of a border, exactly.
+    fn hold_exactly(&mut self) -> Result<usize, TooConcave> {
+        let mut border = self.all_rows();
+        let held = border.factorise(&self.linear.chain, &mut self.factor, 0.0)?;
+        self.exact = Some(border);
+        Ok(held)
     }
 
     /// Adds the springs' forces by the targets at nodes to the right-hand side.
