@@ -141,11 +141,19 @@ impl Search {
 
     /// Searches from the guess, then from other starts, until a minimum is found; if none is, the best end.
     fn cold(&self, program: &BeltProgram, proceed: &mut Proceed) -> Solution<BeltPoint> {
-        let start = match program.half_turns {
-            None => self.through_supports(program, proceed),
+        let through = self.through_supports(program, proceed);
+        let is_through = through.is_some();
+        let start = through.unwrap_or_else(|| match program.half_turns {
+            None => guess(program, &self.bulge),
             Some(half_turns) => self.twisted_up(program, half_turns, proceed),
-        };
+        });
         let mut best = self.minimise(program, start.clone(), self.settings.cold_barrier, proceed);
+        if is_through && !is_done(&best) {
+            best = better(best, |_| {
+                let guess = guess(program, &self.bulge);
+                self.minimise(program, guess, self.settings.cold_barrier, proceed)
+            });
+        }
         if !is_done(&best) {
             best = better(best, |_| self.by_way_of_another(program, &start, proceed));
         }

@@ -17,7 +17,7 @@ const ITERATIONS: usize = 60;
 const LEANING: f64 = 0.05;
 
 impl Search {
-    /// A start for the search. Of a belt held at its ends alone it is the guess; else the shapes of the spans between
+    /// A start for the search for a belt held between its ends, `None` for another: the shapes of the spans between
     /// supports, one after the other, each clamped to the end of the one before.
     ///
     /// A span that a pin ends turns back at its far end by half as much as it is turned at its near end. So the spans do not
@@ -26,10 +26,10 @@ impl Search {
         &self,
         program: &BeltProgram,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
-    ) -> BeltPoint {
+    ) -> Option<BeltPoint> {
         let spans = spans(program);
-        if spans.len() < 2 {
-            return guess(program, &self.bulge);
+        if spans.len() < 2 || program.half_turns.is_some() {
+            return None;
         }
         let mut shape: Option<BeltPoint> = None;
         for nodes in spans {
@@ -38,9 +38,7 @@ impl Search {
             let found = self.shape_of(&span, proceed);
             append(&mut shape, span.to_whole(found));
         }
-        let mut shape = shape.expect("at least one span");
-        program.settle(&mut shape);
-        inside(program, shape)
+        Some(inside(program, shape?))
     }
 
     /// The shape of a span, roughly.

@@ -137,8 +137,12 @@ pub fn assess<P: Program<X, U, N>, const X: usize, const U: usize, const N: usiz
     interior_point.finish(outcome)
 }
 
-/// Depth of an objective that is unbounded below; in [`Scales::objective`](crate::Scales::objective).
+/// Depth of an objective that is unbounded below; in [`Scales::objective`](crate::Scales::objective). Also the damping beyond
+/// which a programme counts as unbounded; second derivative per unit weight.
 const UNBOUNDED: f64 = 1e12;
+/// Damping beyond which multipliers of violated equalities have run away, so that restoration begins with none; second
+/// derivative per unit weight.
+const RUNAWAY: f64 = 1e6;
 
 /// A minimisation under way.
 struct InteriorPoint<'a, P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> {
@@ -198,10 +202,11 @@ impl<'a, P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>
                 self.filter.clear();
             }
             self.iterate.assemble();
-            let is_convex = self.iterate.kkt.factorise().is_ok();
-            if !is_convex
-                && violation(&self.layout, &self.iterate.values) <= self.settings.tolerance
-            {
+            let is_feasible =
+                violation(&self.layout, &self.iterate.values) <= self.settings.tolerance;
+            let most_damping = if is_feasible { UNBOUNDED } else { RUNAWAY };
+            let is_convex = self.iterate.kkt.factorise(most_damping).is_ok();
+            if !is_convex && is_feasible {
                 return Outcome::Unbounded;
             }
             if !(is_convex && self.descends())

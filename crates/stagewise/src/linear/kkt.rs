@@ -204,12 +204,10 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
     /// Factorises with the least damping tried that makes the second derivative positive on the tangent space of the
     /// equalities.
     ///
-    /// Errors: [`TooConcave`] where no damping is enough.
-    pub(crate) fn factorise(&mut self) -> Result<(), TooConcave> {
+    /// Errors: [`TooConcave`] where no damping below `most_damping`, a second derivative per unit weight, is enough.
+    pub(crate) fn factorise(&mut self, most_damping: f64) -> Result<(), TooConcave> {
         /// Damping that is tried first where none is known; second derivative per unit weight.
         const FIRST_DAMPING: f64 = 1e-4;
-        /// Damping beyond which a programme counts as unbounded; second derivative per unit weight.
-        const MOST_DAMPING: f64 = 1e12;
         if self.factorise_damped(0.0).is_ok() {
             return Ok(());
         }
@@ -219,7 +217,7 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         } else {
             FIRST_DAMPING
         };
-        while damping < MOST_DAMPING {
+        while damping < most_damping {
             if self.factorise_damped(damping).is_ok() {
                 self.damping = damping;
                 return Ok(());
@@ -295,13 +293,16 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
 
     /// Compliance matrix of the equalities where the second derivative by the unknowns is the identity; `None` where the
     /// factorisation fails.
+    ///
+    /// Equalities at nodes act as springs too, which leaves of each combination of compliance λ the compliance λ c/(λ + c):
+    /// soft and stiff combinations come close together, and redundant ones keep a compliance of zero.
     pub(crate) fn compliance_of_equalities(&mut self) -> Option<nalgebra::DMatrix<f64>> {
         let stages = self.layout().stages();
         let weights = vec![1.0 / stages as f64; stages + 1];
-        let (linear, factor) = (&self.linear, &mut self.factor);
-        let factorised = linear
-            .chain
-            .factorise(&linear.diagonal, 1.0, &weights, 0, factor);
+        self.diagonal.clone_from(&self.linear.diagonal);
+        self.assemble_nodes();
+        let (chain, factor) = (&self.linear.chain, &mut self.factor);
+        let factorised = chain.factorise(&self.diagonal, 1.0, &weights, 0, factor);
         factorised.ok()?;
         self.assemble_border();
         let mut border = self.all_rows();
