@@ -6,7 +6,7 @@
 mod board;
 
 use super::Problem;
-use crate::scenario::{Axis, LinkSpec, Scenario, SupportSpec};
+use crate::scenario::{Axis, BeltSpec, LinkSpec, Scenario, SupportSpec};
 use board::{BoardPoint, distance};
 use nalgebra::Vector3;
 use std::fmt;
@@ -27,15 +27,20 @@ pub struct OutOfReach {
 /// One line: the supports or the link, the missing length, and the remedy.
 impl fmt::Display for OutOfReach {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let excess = self.distance - self.belt;
         write!(
             f,
-            "{} are {} apart, {} more than the belt between them ({}); move them closer, by {} at least",
+            "{} are {} apart, {} more than the belt between them ({}); move them closer",
             self.held,
             number(self.distance),
-            number(self.distance - self.belt),
-            number(self.belt),
-            number(self.closer)
-        )
+            number(excess),
+            number(self.belt)
+        )?;
+        // Points beside the spine come closer by less than the supports do.
+        match self.closer > excess * (1.0 + 1e-9) {
+            true => write!(f, ", by {} at least", number(self.closer)),
+            false => Ok(()),
+        }
     }
 }
 
@@ -156,7 +161,8 @@ impl Span {
     }
 
     /// The span between two held points, along the axes that both hold.
-    fn between([a, b]: [HeldPoint; 2], scenario: &Scenario) -> Self {
+    fn between(pair: [HeldPoint; 2], scenario: &Scenario) -> Self {
+        let [a, b] = in_order(pair, &scenario.belt);
         let held = [0, 1, 2].map(|k| a.position[k].zip(b.position[k]));
         let along = |of: &dyn Fn(usize, (f64, f64)) -> f64| {
             Vector3::from_fn(|k, _| held[k].map_or(0.0, |pair| of(k, pair)))
@@ -243,6 +249,16 @@ impl Span {
         } else {
             self.excess()
         }
+    }
+}
+
+/// Two points in the order in which the shorter way between them goes along the belt: on a closed belt, it may go through
+/// the seam.
+fn in_order([a, b]: [HeldPoint; 2], belt: &BeltSpec) -> [HeldPoint; 2] {
+    let through_seam = (b.on_board.u - a.on_board.u).abs() > 0.5 * belt.length();
+    match belt.closed && through_seam {
+        true => [b, a],
+        false => [a, b],
     }
 }
 
