@@ -2,24 +2,26 @@
 
     python benchmarks/random_scenarios.py [--kinds link points] [--count 200] [--seed 1]
 
-Each is read off a random developable strip: bend and rib slope are smooth random functions of the arc length, square at
-both ends, and the supports and links hold the places of that strip. So every scenario is feasible, and a solve that does
-not converge has failed. The strip is integrated here, and shares no code with the solver.
+Each is read off a random developable strip: bend and rib slope are smooth random functions of the arc length, the ribs
+at both ends are square, and the supports and links hold the places of that strip. So every scenario is feasible, and a
+solve that does not converge has failed. The strip is integrated here, and shares no code with the solver.
 """
 
 from __future__ import annotations
 
 import argparse
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 import fishbone as fb
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 Array = npt.NDArray[np.float64]
 Json = dict[str, Any]
@@ -45,19 +47,22 @@ class Strip:
         return int(np.abs(self.u - u).argmin())
 
 
-def random_strip(rng: np.random.Generator) -> Strip:
-    """A strip with random smooth bend and rib slope: MODEL notation, ω = (0, −β ω_ζ, ω_ζ)."""
+def random_strip(rng: np.random.Generator, geodesic: float = 0.0, bent: float = 1.0) -> Strip:
+    """A strip of constant in-plane curvature with random smooth bend, `bent` times as large, and rib slope.
+
+    Its rates of rotation are (κ_g, −β ω_ζ, ω_ζ).
+    """
     width = rng.uniform(0.02, 0.2)
     u = np.linspace(0.0, 1.0, STEPS + 1)
     orders = np.arange(WAVES + 1)[:, None]
-    bend = (rng.normal(0.0, 3.0, WAVES + 1) / (1.0 + 0.5 * orders[:, 0])) @ np.cos(np.pi * orders * u)
+    bend = bent * (rng.normal(0.0, 3.0, WAVES + 1) / (1.0 + 0.5 * orders[:, 0])) @ np.cos(np.pi * orders * u)
     slope = rng.normal(0.0, 1.0, WAVES) @ np.sin(np.pi * orders[1:] * u)
     rate = np.abs(np.gradient(slope, u)).max()
     slope *= min(1.0 / np.abs(slope).max(), STEEPEST * 2.0 / width / rate) * rng.uniform(0.0, 1.0)
     middle = 0.5 * (u[1:] + u[:-1])
     bend, slope = np.interp(middle, u, bend), np.interp(middle, u, slope)
-    turns = Rotation.from_rotvec(np.stack([0.0 * bend, -slope * bend, bend], axis=1) / STEPS).as_matrix()
-    halves = Rotation.from_rotvec(np.stack([0.0 * bend, -slope * bend, bend], axis=1) / STEPS / 2.0).as_matrix()
+    rates = np.stack([np.full_like(bend, geodesic), -slope * bend, bend], axis=1)
+    turns, halves = (Rotation.from_rotvec(rates / STEPS / parts).as_matrix() for parts in (1.0, 2.0))
     frame, position = np.empty((STEPS + 1, 3, 3)), np.zeros((STEPS + 1, 3))
     frame[0] = np.eye(3)
     for k in range(STEPS):
@@ -66,7 +71,7 @@ def random_strip(rng: np.random.Generator) -> Strip:
     return Strip(width, u, position, frame)
 
 
-def held(strip: Strip, node: int, with_frame: bool) -> Json:
+def held(strip: Strip, node: int, *, with_frame: bool) -> Json:
     """A support that holds a node of the strip where it is."""
     place = {0: "start", STEPS: "end"}.get(node, float(strip.u[node]))
     support: Json = {"at": place, "position": strip.position[node].tolist()}
@@ -84,8 +89,8 @@ def tables(strip: Strip, energy: str, **parts: list[Json]) -> Json:
 def link(rng: np.random.Generator, energy: str) -> Json:
     """Two clamps and a link."""
     strip = random_strip(rng)
-    ends = [held(strip, node, True) for node in (0, STEPS)]
-    a, b = (strip.at(u) for u in np.sort(rng.uniform(0.05, 0.95, 2)) + [-0.03, 0.03])
+    ends = [held(strip, node, with_frame=True) for node in (0, STEPS)]
+    a, b = (strip.at(u) for u in np.sort(rng.uniform(0.05, 0.95, 2)) + np.array([-0.03, 0.03]))
     offset = (strip.position[b] - strip.position[a]).tolist()
     tie = {"from": float(strip.u[a]), "to": float(strip.u[b]), "offset": offset}
     return tables(strip, energy, supports=ends, links=[tie])
@@ -96,8 +101,8 @@ def points(rng: np.random.Generator, energy: str) -> Json:
     strip = random_strip(rng)
     count = int(rng.integers(1, 7))
     inner = (np.arange(count) + rng.uniform(0.2, 0.8, count)) / count
-    start, end = (held(strip, node, bool(rng.integers(0, 2))) for node in (0, STEPS))
-    between = [held(strip, strip.at(u), False) for u in inner]
+    start, end = (held(strip, node, with_frame=bool(rng.integers(0, 2))) for node in (0, STEPS))
+    between = [held(strip, strip.at(u), with_frame=False) for u in inner]
     return tables(strip, energy, supports=[start, *between, end])
 
 

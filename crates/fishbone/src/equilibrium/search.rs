@@ -139,8 +139,18 @@ impl Search {
         self.minimise(program, inside(program, point), barrier, proceed)
     }
 
-    /// Searches from the guess, then from other starts, until a minimum is found; if none is, the best end.
+    /// Searches from the guess, or through the supports of a belt held between its ends, then from other starts, until a minimum
+    /// is found; if none is, the best end.
     fn cold(&self, program: &BeltProgram, proceed: &mut Proceed) -> Solution<BeltPoint> {
+        // The caller is asked no more after a break, in whatever part of the search it comes.
+        let mut broken = false;
+        let proceed: &mut Proceed = &mut || {
+            broken = broken || proceed().is_break();
+            match broken {
+                true => ControlFlow::Break(()),
+                false => ControlFlow::Continue(()),
+            }
+        };
         let through = self.through_supports(program, proceed);
         let is_through = through.is_some();
         let start = through.unwrap_or_else(|| match program.half_turns {
