@@ -327,7 +327,8 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         }
         let missing = self.find_soft_step(gradient, targets);
         let at_nodes = &targets[..self.layout().equalities_at_nodes()];
-        if missing > SOFT * largest(at_nodes.iter()) && self.hold_exactly().is_ok() {
+        let is_soft = missing > EXACT.max(SOFT * largest(at_nodes.iter()));
+        if is_soft && self.hold_exactly().is_ok() {
             self.find_step(gradient, targets);
         }
     }
