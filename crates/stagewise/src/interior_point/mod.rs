@@ -221,7 +221,7 @@ impl<'a, P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>
 
     /// Goes along the Newton step as far as the filter accepts; false where no length is accepted.
     fn descends(&mut self) -> bool {
-        self.iterate.find_step();
+        self.iterate.find_rigid_step();
         self.search()
     }
 

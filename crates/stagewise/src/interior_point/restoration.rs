@@ -49,7 +49,7 @@ impl<const X: usize, const U: usize, const N: usize> Restoration<X, U, N> {
             .linear
             .add_slack_gradients(force, &mut self.gradient);
         self.kkt
-            .find_soft_step(&self.gradient, &iterate.values.equalities);
+            .find_step(&self.gradient, &iterate.values.equalities);
         let before = violation(self.kkt.layout(), &iterate.values);
         let mut length = self.longest(iterate);
         while length > SHORTEST_STEP {

@@ -319,22 +319,14 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
     ///
     /// The springs in place of equalities have a compliance. Refinement by the remaining residual, the method of multipliers
     /// on the quadratic programme, makes them rigid.
-    pub(crate) fn find_step(&mut self, gradient: &[NodeVector<N>], targets: &[f64]) {
+    ///
+    /// Gives the largest residual that is left of the equalities at nodes.
+    pub(crate) fn find_step(&mut self, gradient: &[NodeVector<N>], targets: &[f64]) -> f64 {
         if let Some(border) = self.exact.take() {
-            self.find_step_exactly(&border, gradient, targets);
+            let left = self.find_step_exactly(&border, gradient, targets);
             self.exact = Some(border);
-            return;
+            return left;
         }
-        let missing = self.find_soft_step(gradient, targets);
-        let at_nodes = &targets[..self.layout().equalities_at_nodes()];
-        let is_soft = missing > EXACT.max(SOFT * largest(at_nodes.iter()));
-        if is_soft && self.hold_exactly().is_ok() {
-            self.find_step(gradient, targets);
-        }
-    }
-
-    /// Finds the step with the equalities at nodes as springs; gives the largest residual of these equalities.
-    pub(crate) fn find_soft_step(&mut self, gradient: &[NodeVector<N>], targets: &[f64]) -> f64 {
         let at_nodes = self.layout().equalities_at_nodes();
         let (targets_at, targets_between) = targets.split_at(at_nodes);
         self.right.copy_from_slice(gradient);
@@ -365,7 +357,17 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         self.take_missing_at_nodes(targets_at)
     }
 
-    /// Factorises the equalities as rows of a border, exactly.
+    /// Finds the step as [`Self::find_step`] does; where that leaves a residual, with the equalities as rows of a border.
+    pub(crate) fn find_rigid_step(&mut self, gradient: &[NodeVector<N>], targets: &[f64]) {
+        let left = self.find_step(gradient, targets);
+        let at_nodes = &targets[..self.layout().equalities_at_nodes()];
+        let is_soft = left > EXACT.max(SOFT * largest(at_nodes.iter()));
+        if is_soft && self.exact.is_none() && self.hold_exactly().is_ok() {
+            self.find_step(gradient, targets);
+        }
+    }
+
+    /// Factorises the equalities as rows of a border, exactly; gives the number of concave directions that they hold.
     fn hold_exactly(&mut self) -> Result<usize, TooConcave> {
         let mut border = self.all_rows();
         let held = border.factorise(&self.linear.chain, &mut self.factor, 0.0)?;
@@ -454,7 +456,7 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         border: &Border<N>,
         gradient: &[NodeVector<N>],
         targets: &[f64],
-    ) {
+    ) -> f64 {
         let targets_at = &targets[..self.layout().equalities_at_nodes()];
         self.right.copy_from_slice(gradient);
         self.pull_at_nodes(targets_at);
@@ -468,7 +470,7 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         let (equalities, others) = forces.as_slice().split_at(targets.len());
         self.multiplier_step.copy_from_slice(equalities);
         self.pair_forces.copy_from_slice(others);
-        self.take_missing_at_nodes(targets_at);
+        self.take_missing_at_nodes(targets_at)
     }
 
     /// Subtracts the equalities' multipliers times their gradients from a gradient by the unknowns.
