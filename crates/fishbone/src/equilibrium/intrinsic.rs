@@ -212,10 +212,10 @@ fn judge(
                 redundant.filter(|_| violation > tolerance.max(CLEARLY_MISSED)) =>
         {
             (
-                Status::Infeasible,
+                Status::NotConverged,
                 format!(
-                    "{names} cannot be met: what is held there is held already, by the rest or by a stiffener, and not \
-                     alike; leave one out"
+                    "{names} are missed by {violation:.1e} (lengths in U, angles in rad): what is held there is held \
+                     already, by the rest or by a stiffener, and perhaps not alike; leave one out"
                 ),
             )
         }

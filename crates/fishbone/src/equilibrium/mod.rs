@@ -4,6 +4,7 @@ mod active_set;
 pub(crate) mod guess;
 mod intrinsic;
 mod search;
+mod spans;
 mod stability;
 mod warnings;
 

@@ -139,13 +139,31 @@ impl Search {
         self.minimise(program, inside(program, point), barrier, proceed)
     }
 
-    /// Searches from the guess, then from other starts, until a minimum is found; if none is, the best end.
+    /// Searches from the guess, or through the supports of a belt held between its ends, then from other starts, until a minimum
+    /// is found; if none is, the best end.
     fn cold(&self, program: &BeltProgram, proceed: &mut Proceed) -> Solution<BeltPoint> {
-        let start = match program.half_turns {
+        // The caller is asked no more after a break, in whatever part of the search it comes.
+        let mut broken = false;
+        let proceed: &mut Proceed = &mut || {
+            broken = broken || proceed().is_break();
+            match broken {
+                true => ControlFlow::Break(()),
+                false => ControlFlow::Continue(()),
+            }
+        };
+        let through = self.through_supports(program, proceed);
+        let is_through = through.is_some();
+        let start = through.unwrap_or_else(|| match program.half_turns {
             None => guess(program, &self.bulge),
             Some(half_turns) => self.twisted_up(program, half_turns, proceed),
-        };
+        });
         let mut best = self.minimise(program, start.clone(), self.settings.cold_barrier, proceed);
+        if is_through && !is_done(&best) {
+            best = better(best, |_| {
+                let guess = guess(program, &self.bulge);
+                self.minimise(program, guess, self.settings.cold_barrier, proceed)
+            });
+        }
         if !is_done(&best) {
             best = better(best, |_| self.by_way_of_another(program, &start, proceed));
         }
@@ -220,7 +238,7 @@ impl Search {
         .after(iterations)
     }
 
-    fn minimise(
+    pub(super) fn minimise(
         &self,
         program: &BeltProgram,
         start: BeltPoint,

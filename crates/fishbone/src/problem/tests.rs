@@ -176,3 +176,44 @@ fn test_supports_out_of_reach_are_named_with_the_missing_length() {
          closer"
     );
 }
+
+#[test]
+fn test_twist_without_slack_is_out_of_reach_by_the_slack_that_it_needs() {
+    let twisted = |y: f64, angle: f64| {
+        let pose = Pose {
+            frame: exp(&(angle * Vector3::y())),
+            position: Vector3::new(3.0, y, 0.0),
+        };
+        let problem = problem().with_support_pose(1, &pose).unwrap();
+        problem.unreachable_supports()
+    };
+    // Ends of width V a length L apart, turned by θ: the diagonal of a corner is √(D² + V²/2 (1 − cos θ)) ≤ L.
+    let (width, angle) = (0.1f64, 0.5 * PI);
+    let reach = (1.0 - 0.5 * width * width * (1.0 - angle.cos())).sqrt();
+    let refused = twisted(1.0, angle).unwrap();
+    assert!((refused.closer - (1.0 - reach)).abs() < 1e-12);
+    assert!(refused.to_string().starts_with(
+        "supports[0] and supports[1], at u = 0, v = 0.05 and u = 1, v = 0.05, are 1.002497 apart"
+    ));
+    assert!(twisted(reach + 1e-9, angle).is_some());
+    assert_eq!(twisted(reach - 1e-9, angle), None);
+    assert_eq!(twisted(1.0, 0.0), None);
+}
+
+#[test]
+fn test_link_that_takes_up_the_slack_is_out_of_reach() {
+    let linked = |offset: [f64; 3]| {
+        let mut scenario = scenario();
+        scenario.links = vec![crate::scenario::LinkSpec {
+            from: Place::ArcLength(0.3),
+            to: Place::ArcLength(0.7),
+            offset,
+        }];
+        Problem::new(scenario).unwrap().unreachable_supports()
+    };
+    // The ends are 0.6 apart along y: a link that goes back by d leaves 0.6 + d for the 0.6 of belt outside it.
+    assert_eq!(linked([0.0, 0.001, 0.0]), None);
+    let refused = linked([0.0, -0.1, 0.0]).unwrap();
+    assert!((refused.closer - 0.1).abs() < 1e-12);
+    assert!(refused.held.contains("less the offset of links[0]"));
+}

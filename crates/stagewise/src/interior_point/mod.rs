@@ -137,8 +137,12 @@ pub fn assess<P: Program<X, U, N>, const X: usize, const U: usize, const N: usiz
     interior_point.finish(outcome)
 }
 
-/// Depth of an objective that is unbounded below; in [`Scales::objective`](crate::Scales::objective).
+/// Depth of an objective that is unbounded below; in [`Scales::objective`](crate::Scales::objective). Also the damping beyond
+/// which a programme counts as unbounded; second derivative per unit weight.
 const UNBOUNDED: f64 = 1e12;
+/// Damping beyond which multipliers of violated equalities have run away, so that restoration begins with none; second
+/// derivative per unit weight.
+const RUNAWAY: f64 = 1e6;
 
 /// A minimisation under way.
 struct InteriorPoint<'a, P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> {
@@ -198,11 +202,14 @@ impl<'a, P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>
                 self.filter.clear();
             }
             self.iterate.assemble();
-            if self.iterate.kkt.factorise().is_err() {
+            let is_feasible =
+                violation(&self.layout, &self.iterate.values) <= self.settings.tolerance;
+            let most_damping = if is_feasible { UNBOUNDED } else { RUNAWAY };
+            let is_convex = self.iterate.kkt.factorise(most_damping).is_ok();
+            if !is_convex && is_feasible {
                 return Outcome::Unbounded;
             }
-            self.iterate.find_step();
-            if !self.search()
+            if !(is_convex && self.descends())
                 && let Some(outcome) = self.recover(proceed)
             {
                 return outcome;
@@ -210,6 +217,12 @@ impl<'a, P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>
             self.iterate.linearise();
             self.iteration += 1;
         }
+    }
+
+    /// Goes along the Newton step as far as the filter accepts; false where no length is accepted.
+    fn descends(&mut self) -> bool {
+        self.iterate.find_rigid_step();
+        self.search()
     }
 
     /// Whether the caller has interrupted, now or before.

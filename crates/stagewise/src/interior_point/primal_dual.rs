@@ -147,6 +147,13 @@ impl<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> Primal
         self.kkt.find_step(&self.gradient, &self.values.equalities);
     }
 
+    /// Newton step of the barrier problem that meets the linearised equalities however stiff they are.
+    pub(super) fn find_rigid_step(&mut self) {
+        self.find_barrier_gradient();
+        let targets = &self.values.equalities;
+        self.kkt.find_rigid_step(&self.gradient, targets);
+    }
+
     /// Gradient of the barrier problem's Lagrangian.
     pub(crate) fn find_barrier_gradient(&mut self) {
         self.gradient.copy_from_slice(&self.kkt.linear.gradient);

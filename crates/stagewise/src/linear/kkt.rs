@@ -17,10 +17,10 @@ mod tests;
 use super::TooConcave;
 use super::border::{Border, Row};
 use super::chain::{Diagonal, Factor, NodeMatrix, NodeVector};
-use crate::larger;
 use crate::layout::{Block, Layout};
 use crate::linearisation::{Linearisation, product};
 use crate::program::{Multipliers, Program, Values};
+use crate::{larger, largest};
 use nalgebra::SMatrix;
 use std::ops::Range;
 
@@ -28,6 +28,9 @@ use std::ops::Range;
 const COMPLIANCE: f64 = 1e-7;
 /// Largest count of refinements by which springs become rigid; a number.
 const REFINEMENTS: usize = 2;
+/// Residual of the linearised equalities after the refinements above which the springs are too soft beside the chain, and
+/// the equalities become rows of a border; a share of their targets.
+const SOFT: f64 = 1e-3;
 /// Residual of the linearised equalities that is rounding; in the unit of the equalities.
 const EXACT: f64 = 1e-12;
 
@@ -201,12 +204,10 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
     /// Factorises with the least damping tried that makes the second derivative positive on the tangent space of the
     /// equalities.
     ///
-    /// Errors: [`TooConcave`] where no damping is enough.
-    pub(crate) fn factorise(&mut self) -> Result<(), TooConcave> {
+    /// Errors: [`TooConcave`] where no damping below `most_damping`, a second derivative per unit weight, is enough.
+    pub(crate) fn factorise(&mut self, most_damping: f64) -> Result<(), TooConcave> {
         /// Damping that is tried first where none is known; second derivative per unit weight.
         const FIRST_DAMPING: f64 = 1e-4;
-        /// Damping beyond which a programme counts as unbounded; second derivative per unit weight.
-        const MOST_DAMPING: f64 = 1e12;
         if self.factorise_damped(0.0).is_ok() {
             return Ok(());
         }
@@ -216,7 +217,7 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         } else {
             FIRST_DAMPING
         };
-        while damping < MOST_DAMPING {
+        while damping < most_damping {
             if self.factorise_damped(damping).is_ok() {
                 self.damping = damping;
                 return Ok(());
@@ -250,9 +251,7 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
     /// Errors: [`TooConcave`] where the chain has a direction of zero curvature.
     pub(crate) fn factorise_exactly(&mut self) -> Result<usize, TooConcave> {
         let concave = self.factorise_chain()? + self.border.concave_rows();
-        let mut border = self.all_rows();
-        let held = border.factorise(&self.linear.chain, &mut self.factor, 0.0)?;
-        self.exact = Some(border);
+        let held = self.hold_exactly()?;
         Ok(concave.saturating_sub(held))
     }
 
@@ -294,13 +293,16 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
 
     /// Compliance matrix of the equalities where the second derivative by the unknowns is the identity; `None` where the
     /// factorisation fails.
+    ///
+    /// Equalities at nodes act as springs too, which leaves of each combination of compliance λ the compliance λ c/(λ + c):
+    /// soft and stiff combinations come close together, and redundant ones keep a compliance of zero.
     pub(crate) fn compliance_of_equalities(&mut self) -> Option<nalgebra::DMatrix<f64>> {
         let stages = self.layout().stages();
         let weights = vec![1.0 / stages as f64; stages + 1];
-        let (linear, factor) = (&self.linear, &mut self.factor);
-        let factorised = linear
-            .chain
-            .factorise(&linear.diagonal, 1.0, &weights, 0, factor);
+        self.diagonal.clone_from(&self.linear.diagonal);
+        self.assemble_nodes();
+        let (chain, factor) = (&self.linear.chain, &mut self.factor);
+        let factorised = chain.factorise(&self.diagonal, 1.0, &weights, 0, factor);
         factorised.ok()?;
         self.assemble_border();
         let mut border = self.all_rows();
@@ -317,11 +319,13 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
     ///
     /// The springs in place of equalities have a compliance. Refinement by the remaining residual, the method of multipliers
     /// on the quadratic programme, makes them rigid.
-    pub(crate) fn find_step(&mut self, gradient: &[NodeVector<N>], targets: &[f64]) {
+    ///
+    /// Gives the largest residual that is left of the equalities at nodes.
+    pub(crate) fn find_step(&mut self, gradient: &[NodeVector<N>], targets: &[f64]) -> f64 {
         if let Some(border) = self.exact.take() {
-            self.find_step_exactly(&border, gradient, targets);
+            let left = self.find_step_exactly(&border, gradient, targets);
             self.exact = Some(border);
-            return;
+            return left;
         }
         let at_nodes = self.layout().equalities_at_nodes();
         let (targets_at, targets_between) = targets.split_at(at_nodes);
@@ -337,7 +341,7 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         for _ in 0..REFINEMENTS {
             let most = self.take_missing_at_nodes(targets_at);
             if most <= EXACT && self.border.rows.is_empty() {
-                return;
+                return most;
             }
             self.pull_again_at_nodes(targets_at);
             self.linear
@@ -350,7 +354,25 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
                 *step += correction;
             }
         }
-        self.take_missing_at_nodes(targets_at);
+        self.take_missing_at_nodes(targets_at)
+    }
+
+    /// Finds the step as [`Self::find_step`] does; where that leaves a residual, with the equalities as rows of a border.
+    pub(crate) fn find_rigid_step(&mut self, gradient: &[NodeVector<N>], targets: &[f64]) {
+        let left = self.find_step(gradient, targets);
+        let at_nodes = &targets[..self.layout().equalities_at_nodes()];
+        let is_soft = left > EXACT.max(SOFT * largest(at_nodes.iter()));
+        if is_soft && self.exact.is_none() && self.hold_exactly().is_ok() {
+            self.find_step(gradient, targets);
+        }
+    }
+
+    /// Factorises the equalities as rows of a border, exactly; gives the number of concave directions that they hold.
+    fn hold_exactly(&mut self) -> Result<usize, TooConcave> {
+        let mut border = self.all_rows();
+        let held = border.factorise(&self.linear.chain, &mut self.factor, 0.0)?;
+        self.exact = Some(border);
+        Ok(held)
     }
 
     /// Adds the springs' forces by the targets at nodes to the right-hand side.
@@ -434,7 +456,7 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         border: &Border<N>,
         gradient: &[NodeVector<N>],
         targets: &[f64],
-    ) {
+    ) -> f64 {
         let targets_at = &targets[..self.layout().equalities_at_nodes()];
         self.right.copy_from_slice(gradient);
         self.pull_at_nodes(targets_at);
@@ -448,7 +470,7 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         let (equalities, others) = forces.as_slice().split_at(targets.len());
         self.multiplier_step.copy_from_slice(equalities);
         self.pair_forces.copy_from_slice(others);
-        self.take_missing_at_nodes(targets_at);
+        self.take_missing_at_nodes(targets_at)
     }
 
     /// Subtracts the equalities' multipliers times their gradients from a gradient by the unknowns.

@@ -22,7 +22,7 @@ pub fn redundant_equalities<P: Program<X, U, N>, const X: usize, const U: usize,
 /// The rows in linear combinations of zero compliance.
 fn involved(compliance: &DMatrix<f64>) -> Vec<usize> {
     /// Eigenvalue of the scaled compliance below which rows depend on each other; dimensionless.
-    const DEPENDENT: f64 = 1e-13;
+    const DEPENDENT: f64 = 1e-11;
     /// Entry of a unit eigenvector above which a row participates in the dependence; dimensionless.
     const PARTICIPATION: f64 = 1e-3;
     let rows = 0..compliance.nrows();

@@ -227,3 +227,38 @@ proptest! {
         prop_assert!(is_met(&kkt) || !is_convex);
     }
 }
+
+#[test]
+fn test_equality_that_is_stiffer_than_its_spring_is_met_by_the_rigid_step_alone() {
+    // The generator is that of Lehmer, with multiplier 16807.
+    let numbers = std::iter::successors(Some(1u64), |x| Some(x * 16807 % 2_147_483_647));
+    let mut numbers = numbers.map(|x| 2.0 * x as f64 / 2_147_483_647.0 - 1.0);
+    let mut kkt = Kkt::<2, 1, 3>::new(layout());
+    fill(&mut kkt.linear, 30.0, &mut numbers);
+    let scale = 1e-5;
+    kkt.linear.equalities_at[0] *= scale;
+    let rows = kkt.layout().inequalities();
+    let values = Values {
+        slacks: vec![1.0; rows],
+        ..Values::default()
+    };
+    kkt.assemble(&values, &vec![1.0; rows]);
+    let targets = [0.3 * scale, -0.2];
+    let gradient = kkt.linear.gradient.clone();
+    let (nodes, _) = Dense::of(&kkt).solve(&gradient, &targets);
+    let missed = |kkt: &Kkt<2, 1, 3>| {
+        let pairs = kkt.step.iter().zip(&nodes);
+        pairs.fold(0.0, |most: f64, (found, exact)| {
+            most.max((found - exact).amax())
+        })
+    };
+    let size = nodes
+        .iter()
+        .flatten()
+        .fold(0.0, |most: f64, x| most.max(x.abs()));
+    assert_eq!(kkt.factorise_damped(0.0), Ok(()));
+    kkt.find_step(&gradient, &targets);
+    assert!(missed(&kkt) > 0.1 * size);
+    kkt.find_rigid_step(&gradient, &targets);
+    assert!(missed(&kkt) < 1e-6 * size);
+}

@@ -1,0 +1,91 @@
+"""Supports and links: those that some strip meets are met, those that none can meet are refused at once."""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+import sys
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from scipy.special import j0
+
+from helpers import belt, solve_any, support
+
+FOLDER = Path(__file__).parents[1] / "benchmarks"
+
+
+def benchmark() -> ModuleType:
+    """The generator of random scenarios, which integrates its strips on its own."""
+    spec = importlib.util.spec_from_file_location("random_scenarios", FOLDER / "random_scenarios.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+RANDOM = benchmark()
+
+
+# ------------------------------------------------------------------------------------------------ many supports
+
+
+@pytest.mark.parametrize("pins", [10, 20, 30, 60])
+def test_pins_in_line_have_the_energy_of_a_wave_from_pin_to_pin(pins: int) -> None:
+    """θ = a sin πku closes the length from pin to pin if J₀(a) is the pins' distance; ½ ∫ θ'² is near to a² π² k²/4."""
+    reach = 0.95
+    amplitude = brentq(lambda a: j0(a) - reach, 0.1, 1.0)
+    places = [(i / pins, [0.0, reach * i / pins, 0.0]) for i in range(pins + 1)]
+    supports: list[Any] = [{"at": u, "position": position} for u, position in places]
+    found = solve_any(belt(supports, width=0.02))
+    assert found.status == "converged"
+    assert found.energy == pytest.approx(0.25 * (amplitude * math.pi * pins) ** 2, rel=0.02)
+    assert found.warnings == []
+
+
+@pytest.mark.parametrize(("kind", "least"), [("link", 1.0), ("points", 0.96)])
+def test_supports_and_links_that_a_strip_meets_are_met(kind: str, least: float) -> None:
+    found = [solve_any(tables) for tables in RANDOM.scenarios(kind, 30, 2)]
+    assert not [equilibrium.message for equilibrium in found if equilibrium.status == "infeasible"]
+    assert np.mean([equilibrium.status == "converged" for equilibrium in found]) >= least
+
+
+# ------------------------------------------------------------------------------------------------ out of reach
+
+
+def test_quarter_twist_over_the_whole_length_needs_slack() -> None:
+    """The edges of length 1 would be the diagonals √(1 + V²/2)."""
+    width = 0.2
+    ends = [support("start", [0, 0, 0], [0, 0, 0]), support("end", [0, 1, 0], [0, math.pi / 2, 0])]
+    found = solve_any(belt(ends, width=width))
+    assert (found.status, found.iterations) == ("infeasible", 0)
+    missing = 1.0 - math.sqrt(1.0 - width**2 / 2.0)
+    assert f"move them closer, by {missing:.6f} at least" in found.message
+
+
+def test_link_that_leaves_the_rest_too_short_is_refused() -> None:
+    ends = [support("start", [0, 0, 0], [0, 0, 0]), support("end", [0, 0.9, 0], [0, 0, 0])]
+    back = {"from": 0.3, "to": 0.7, "offset": [0.0, -0.2, 0.0]}
+    found = solve_any(belt(ends) | {"links": [back]})
+    assert (found.status, found.iterations) == ("infeasible", 0)
+    assert "less the offset of links[0]" in found.message
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_clamps_of_a_strip_are_never_out_of_reach(seed: int) -> None:
+    """Straight boards and arcs, from flat to strongly bent: the nearer to flat, the less slack."""
+    rng = np.random.default_rng(seed)
+    geodesic = rng.choice([0.0, rng.uniform(-3.0, 3.0)])
+    strip = RANDOM.random_strip(rng, geodesic, 10.0 ** rng.uniform(-3.0, 0.0))
+    ends = [RANDOM.held(strip, node, with_frame=True) for node in (0, RANDOM.STEPS)]
+    tables = belt(ends, width=strip.width)
+    if geodesic != 0.0:
+        tables["belt"]["segments"] = [{"kind": "arc", "length": 1.0, "curvature": geodesic}]
+    tables["solver"] = {"elements": 20}
+    assert solve_any(tables).status != "infeasible"
