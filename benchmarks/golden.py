@@ -40,7 +40,7 @@ import fishbone as fb
 import random_poses
 import shear
 from branches import random_shape
-from cases import ENERGIES, EXAMPLES
+from cases import ENERGIES, EXAMPLES, on_one_mesh
 from tables import ROOT
 from validation import processor
 
@@ -125,7 +125,7 @@ def _changed(scenario: fb.Scenario, energy: str | None = None, **solver: Any) ->
 
 @functools.cache
 def _example(name: str) -> fb.Scenario:
-    return fb.load(ROOT / "scenarios" / f"{name}.toml")
+    return fb.Scenario.from_dict(on_one_mesh(fb.load(ROOT / "scenarios" / f"{name}.toml").to_dict()))
 
 
 @functools.cache
@@ -149,7 +149,7 @@ def variants() -> Cases:
 
 def boards() -> Cases:
     """Cases beyond the shipped scenarios: links, inner supports, slides, hinges, several loads and rigidities."""
-    return {name: _case(fb.solve(fb.Scenario.from_dict(tables))) for name, tables in _boards()}
+    return {name: _case(fb.solve(fb.Scenario.from_dict(on_one_mesh(tables)))) for name, tables in _boards()}
 
 
 def _boards() -> Iterator[tuple[str, dict[str, Any]]]:
@@ -186,7 +186,8 @@ def poses(count: int = POSES) -> Cases:
     """The first so many of the random poses, the three energies in turn."""
     rng = np.random.default_rng(1)
     energies = [ENERGIES[index % len(ENERGIES)] for index in range(count)]
-    found = fb.solve_many([random_poses.scenario(energy, *random_poses.pose(rng)) for energy in energies])
+    asked = [random_poses.scenario(energy, *random_poses.pose(rng)) for energy in energies]
+    found = fb.solve_many([fb.Scenario.from_dict(on_one_mesh(scenario.to_dict())) for scenario in asked])
     return {f"{index}, {found[index].energy_model}": _pose(found[index]) for index in range(count)}
 
 

@@ -227,8 +227,8 @@ def test_a_start_near_a_higher_minimum_gives_it(arches, arch):
     higher = next(one for one in arches[1:] if one.stable)
     wobble = 0.02 * np.sin(3.0 * np.pi * higher.u)
     again = fb.solve(arch, start=(higher.bend + 5.0 * wobble, higher.rib_slope + wobble))
-    assert again.energy == pytest.approx(higher.energy, rel=1e-8)
-    assert fb.solve(arch).energy == pytest.approx(arches[0].energy, rel=1e-8)
+    assert again.energy == pytest.approx(higher.energy, rel=1e-5)
+    assert fb.solve(arch).energy == pytest.approx(arches[0].energy, rel=1e-5)
 
 
 def test_a_start_may_have_fewer_points_than_the_mesh(arches, arch):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import fishbone as fb
+from cases import on_one_mesh
 from conftest import ROOT
 from fishbone import _core
 
@@ -35,7 +36,8 @@ def solved(*supports, **tables):
 
 
 def bent():
-    return fb.solve(fb.load(ROOT / "scenarios" / "bent.toml"))
+    tables = fb.load(ROOT / "scenarios" / "bent.toml").to_dict()
+    return fb.solve(fb.Scenario.from_dict(on_one_mesh(tables)))
 
 
 def apart():

@@ -10,17 +10,17 @@ import fishbone as fb
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 ITERATIONS = {
-    "bent": 12,
-    "cantilever": 9,
-    "curl": 11,
-    "curved": 15,
-    "example1": 12,
-    "example2": 16,
-    "hinge": 79,
-    "mobius": 62,
-    "planar": 5,
-    "polystyrene": 14,
-    "twist": 33,
+    "bent": 33,
+    "cantilever": 14,
+    "curl": 18,
+    "curved": 24,
+    "example1": 30,
+    "example2": 31,
+    "hinge": 83,
+    "mobius": 71,
+    "planar": 10,
+    "polystyrene": 25,
+    "twist": 72,
 }
 """Iterations over all attempts, as of the last intended change of the solver."""
 PLAY = 2

@@ -19,6 +19,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import fishbone as fb
+from cases import on_one_mesh
 from helpers import ORIGIN, Array, Json, numbers, rotation_matrix, rotation_vector, support, total_length
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
@@ -40,7 +41,7 @@ decides which of the two the search finds. As a function of the pose the lower o
 
 def shipped(name: str) -> Json:
     """Solved as tightly as need be, with rotation vectors; where nothing is held the start is, with a free rib."""
-    scenario: Json = fb.load(SCENARIOS / f"{name}.toml").to_dict()
+    scenario = on_one_mesh(fb.load(SCENARIOS / f"{name}.toml").to_dict())
     scenario["solver"]["tolerance"] = TOLERANCE
     if not scenario["supports"]:
         scenario["supports"] = [support("start", ORIGIN, ORIGIN, square_rib=False)]

@@ -85,24 +85,23 @@ def test_bulging_the_other_way_gives_the_mirror_image(
 
 
 @rows
-def test_default_discretisation_is_80_elements(
+def test_default_mesh_follows_the_error(
     name: str, energy: Energy, value: float, peak: tuple[float, float, float]
 ) -> None:
-    """CONTRACT: 8 U/V, at least 80; both are 80 here, and bulge is +x by default: nothing changes."""
+    """CONTRACT: `accuracy` 1e-3; bulge is +x by default."""
     build = {"example1": example1, "example2": example2}[name]
     equilibrium = solve(build(energy))
-    assert equilibrium.u.shape == (81,)
-    assert equilibrium.energy == pytest.approx(solved(name, energy).energy, rel=1e-9)
+    assert equilibrium.error is not None
+    assert max(equilibrium.error) <= 1e-3
+    assert equilibrium.energy == pytest.approx(value, rel=ENERGY_ERROR)
+    assert highest_point(equilibrium)[0] == pytest.approx(peak[0], abs=PEAK_ERROR)
 
 
-def test_narrow_belt_gets_8_elements_per_width() -> None:
-    """CONTRACT: the default number of elements is 8 U/V."""
-    assert solve(example1("sadowsky", width=0.05)).u.shape == (161,)
-
-
-def test_wide_belt_gets_at_least_80_elements() -> None:
-    """CONTRACT: the default number of elements is at least 80."""
-    assert solve(example1("sadowsky", width=0.2)).u.shape == (81,)
+def test_elements_fix_a_mesh_of_equal_length() -> None:
+    """CONTRACT: `elements` fixes a uniform mesh."""
+    lengths = np.diff(solved("example1", "sadowsky").u)
+    assert lengths.size == ELEMENTS
+    np.testing.assert_allclose(lengths, 1.0 / ELEMENTS, rtol=1e-12)
 
 
 def test_wunderlich_is_the_default_energy() -> None:

@@ -52,7 +52,8 @@ def test_scenario_comes_to_what_finer_meshes_say(name: str) -> None:
     energy, highest = GOLDEN[name]
     assert equilibrium.energy == pytest.approx(energy, rel=ENERGY_ERROR)
     place = equilibrium.highest_point.position / equilibrium.u[-1]
-    np.testing.assert_allclose(place, highest, atol=PLACE_ERROR)
+    if name != "mobius":  # it may slide along itself, held at a place of its own choice
+        np.testing.assert_allclose(place, highest, atol=PLACE_ERROR)
     assert equilibrium.warnings == []
     assert equilibrium.crosses_itself is None
 

@@ -486,7 +486,7 @@ def test_the_system_is_factorised_once(equilibrium: fb.Equilibrium) -> None:
     ("arguments", "message"),
     [
         ({"supports": np.zeros((3, 6))}, r"supports: found an array of shape \(3, 6\), allowed \(2, 6\)"),
-        ({"rigidity": 1.0}, r"rigidity: found an array of shape \(\), allowed \(81,\)"),
+        ({"rigidity": 1.0}, r"rigidity: found an array of shape \(\), allowed \(\d+,\)"),
         ({"natural_bend": [1.0, 2.0]}, r"natural_bend: found an array of shape \(2,\), allowed \(1,\)"),
         ({"width": [1.0]}, r"width: found an array of shape \(1,\), allowed \(\)"),
         ({"gravity": "down"}, "gravity: found str"),
@@ -499,7 +499,7 @@ def test_directions_of_another_shape_are_refused(equilibrium: fb.Equilibrium, ar
 
 
 def test_weights_of_another_shape_are_refused(equilibrium: fb.Equilibrium) -> None:
-    with pytest.raises(fb.InvalidArgument, match=r"position: found an array of shape \(3,\), allowed \(81, 3\)"):
+    with pytest.raises(fb.InvalidArgument, match=r"position: found an array of shape \(3,\), allowed \(\d+, 3\)"):
         equilibrium.sensitivity().adjoint(position=[0.0, 0.0, 1.0])
 
 

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+import fishbone as fb
+from cases import on_one_mesh
 from conftest import ROOT
 from speed import guess, measure, report
 from speed.problem import EXAMPLES, ROTATION, TRANSLATION, Answer, end_pose, path
@@ -81,7 +83,8 @@ def test_a_section_without_records_says_that_it_was_not_measured():
     assert report.text(["a", "b"], []) == "Not measured."
 
 
-def test_slsqp_has_the_transcription_of_the_core(equilibrium):
+def test_slsqp_has_the_transcription_of_the_core(example):
+    equilibrium = fb.solve(fb.Scenario.from_dict(on_one_mesh(example.to_dict())))
     rival = Slsqp("fishbone", 80)
     fields = np.stack([equilibrium.bend, equilibrium.rib_slope], axis=1).ravel()
     rival.found = fields[rival.unknown]

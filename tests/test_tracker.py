@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import fishbone as fb
+from cases import on_one_mesh
 from helpers import ENERGIES, Energy, rotation_vector
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
@@ -144,8 +145,8 @@ def test_large_update_is_made_in_steps() -> None:
 @pytest.mark.parametrize("name", ["curved", "bent", "hinge", "polystyrene"])
 def test_boards_of_all_kinds_are_followed(name: str) -> None:
     """Arcs, corners, stiffeners, materials in SI units."""
-    scenario = fb.load(SCENARIOS / f"{name}.toml")
-    end = scenario.to_dict()["supports"][-1]
+    tables = on_one_mesh(fb.load(SCENARIOS / f"{name}.toml").to_dict())
+    scenario, end = fb.Scenario.from_dict(tables), tables["supports"][-1]
     rotation = np.array(fb.solve(scenario).frame[-1])
     tracker = fb.Tracker(scenario, -1)
     length = float(tracker.u[-1])

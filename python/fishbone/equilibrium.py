@@ -86,6 +86,19 @@ class Residuals(NamedTuple):
     complementarity: float
 
 
+class MeshError(NamedTuple):
+    """Estimated errors of a result by its mesh, relative and not negative; NaN where a quantity is not determined."""
+
+    energy: float
+    """Error of the energy over the energy, or over the elastic energy where that is larger."""
+    position: float
+    """Largest error of a position on the spine over U; NaN of a closed belt that may slide along itself."""
+    force: float
+    """Largest error of a reaction or link force over the largest force of all, forces in R_f/U², moments in R_f/U."""
+    radius: float
+    """Error of the tightest bend on the spine over this bend."""
+
+
 class Mode(NamedTuple):
     """A motion from an equilibrium that the second variation of the energy does not couple with other modes.
 
@@ -274,6 +287,16 @@ class Equilibrium:
     def residuals(self) -> Residuals:
         """The residuals of the discrete equations."""
         return Residuals(*self._inner.residuals)
+
+    @property
+    def error(self) -> MeshError | None:
+        """The estimated error by the mesh, by one Newton step on a mesh twice as fine.
+
+        None of a solve that has not converged by the intrinsic method, and where the finer mesh has no equilibrium next
+        to this one.
+        """
+        error = self._inner.error
+        return None if error is None else MeshError(*error)
 
     @property
     def u(self) -> Floats:

@@ -125,6 +125,8 @@ def _quantities(equilibrium: Equilibrium) -> Iterator[tuple[str, str, str]]:
         yield "half turns", str(equilibrium.half_turns), "of a closed belt"
     yield "crosses itself", *_crossing(equilibrium.crosses_itself)
     yield "local minimum", MINIMUM[equilibrium.stable], ""
+    for name, error in equilibrium.error._asdict().items() if equilibrium.error else ():
+        yield f"error by the mesh, {name}", "not known" if math.isnan(error) else f"{error:.1e}", "estimated"
     for name, residual in equilibrium.residuals._asdict().items():
         yield f"residual, {name}", f"{residual:.1e}", ""
     yield "iterations", str(equilibrium.iterations), ""

@@ -137,6 +137,13 @@ impl Equilibrium {
         )
     }
 
+    /// (energy, position, force, radius), estimated with the GIL released; None where there is no estimate.
+    #[getter]
+    fn error(&self, py: Python<'_>) -> Option<(f64, f64, f64, f64)> {
+        let error = py.detach(|| self.solved.error())?;
+        Some((error.energy, error.position, error.force, error.radius))
+    }
+
     /// Shapes: (n,).
     #[getter]
     fn u<'py>(&self, py: Python<'py>) -> Scalars<'py> {

@@ -13,14 +13,15 @@ fn solved(toml: &str) -> Equilibrium {
     solve(&problem, &mut || ControlFlow::Continue(()))
 }
 
-/// A straight belt with its end at (0, y, 0.1).
+/// A straight belt of 80 elements with its end at (0, y, 0.1).
 fn clamped(y: f64) -> String {
     format!(
         "belt = {{ width = 0.1, rigidity = 2.0, segments = [{{ kind = 'straight', length = 1.0 }}] }}
          supports = [
            {{ at = 'start', position = [0, 0, 0], rotation = [0, 0, 0] }},
            {{ at = 'end', position = [0, {y}, 0.1], rotation = [0, 0, 0] }},
-         ]"
+         ]
+         solver = {{ elements = 80 }}"
     )
 }
 

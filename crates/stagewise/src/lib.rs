@@ -21,7 +21,9 @@ mod linearisation;
 mod path;
 mod program;
 
-pub use interior_point::{Outcome, Residuals, Settings, Solution, assess, minimise};
+pub use interior_point::{
+    Correction, Outcome, Residuals, Settings, Solution, assess, correct, minimise,
+};
 pub use layout::{Block, Layout};
 pub use linear::chain::{ByControls, Chain, Diagonal, NodeMatrix, NodeVector, Stage};
 pub use linear::{

@@ -8,7 +8,7 @@ use common::check::{check_derivatives, check_linear_algebra};
 use nalgebra::{SMatrix, SVector};
 use stagewise::{
     Layout, Linearisation, Multipliers, NodeVector, Outcome, Program, Settings, Solution, Values,
-    minimise,
+    correct, minimise,
 };
 use std::ops::ControlFlow;
 
@@ -263,4 +263,24 @@ fn test_caller_may_end_it() {
 fn test_same_input_gives_the_same_bits() {
     let [a, b] = [0, 1].map(|_| solved(&cart(1.0, 4.0, Asked::AtEnd), 0.0));
     assert_eq!((a.at, a.values), (b.at, b.values));
+}
+
+#[test]
+fn test_one_newton_step_corrects_a_quadratic_programme_and_foretells_its_objective() {
+    let cart = cart(0.4, 100.0, Asked::AtEnd);
+    let solution = solved(&cart, 0.0);
+    let mut near = solution.at.clone();
+    let aside = 0.03;
+    near.point.push[3] += aside;
+    let corrected = correct(&cart, 1e-9, near).unwrap();
+    assert!((corrected.objective - solution.values.objective).abs() < 1e-9);
+    let pushes = corrected.point.push.iter().zip(&solution.at.point.push);
+    assert!(pushes.into_iter().all(|(a, b)| (a - b).abs() < 1e-7));
+    let multiplier = solution.at.multipliers.equalities[2];
+    assert!((corrected.equalities[2] - multiplier).abs() < 1e-7);
+    // Two stages cost ½ SHARE mean² each, and the push is half of either mean.
+    let curvature = 0.5 * SHARE;
+    let gain = 0.5 * curvature * aside * aside;
+    assert!((corrected.gains[3] / gain - 1.0).abs() < 1e-4);
+    assert!(corrected.gains[6] < 1e-6 * gain);
 }

@@ -53,10 +53,12 @@ pub fn branches(
     watch: &dyn Watch,
 ) -> Vec<Equilibrium> {
     let proceed = &mut || watch.proceed();
+    let (asked, meshed) = (problem, problem.with_elements(problem.elements()));
+    let problem = meshed.as_ref().unwrap_or(asked);
     let first = crate::solve::solve(problem, proceed);
     let is_intrinsic = problem.scenario().solver.method == Method::Intrinsic;
     if first.status == Status::Infeasible || !is_intrinsic {
-        return vec![first];
+        return vec![crate::solve::solve(asked, proceed)];
     }
     let mut census = Census {
         problem,
@@ -67,15 +69,16 @@ pub fn branches(
         done: AtomicUsize::new(0),
         planned: 0,
     };
-    census.enter(first.clone());
+    census.enter(first);
     census.start();
     census.perturb();
     census.load();
     census.confirm();
     census.face();
+    census.refine(asked);
     let mut found = census.found;
     if found.is_empty() {
-        return vec![first];
+        return vec![crate::solve::solve(asked, proceed)];
     }
     found.sort_by(|a, b| a.energy.total_cmp(&b.energy));
     found
@@ -250,6 +253,17 @@ impl Census<'_> {
                 self.found.push(found);
             }
         }
+    }
+
+    /// Replaces the minima by those on meshes that follow the error, where the problem asks for that.
+    fn refine(&mut self, asked: &Problem) {
+        let found = std::mem::take(&mut self.found);
+        let (settings, watch) = (self.settings, self.watch);
+        self.found = self.each(&found, |found| {
+            let refined = found.refined_for(asked, &mut || watch.proceed());
+            let same = refined.filter(|refined| settings.is_like(found, refined));
+            same.unwrap_or_else(|| found.clone())
+        });
     }
 
     /// Replaces a minimum by its mirror image if the image meets the supports too and bulges more along `solver.bulge`.

@@ -299,7 +299,6 @@ impl Diagram {
     pub(crate) fn problem(&self, branch: usize, state: usize) -> Problem {
         let place = self.branches[branch].states[state].place;
         let problem = self.path.at(place);
-        let problem = problem.and_then(|p| p.with_elements(self.path.base().elements()).ok());
         problem.expect("it was solved there")
     }
 

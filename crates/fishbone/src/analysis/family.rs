@@ -101,7 +101,7 @@ mod tests {
             clamp(Place::Start, [0.1, 0.2, -0.3], [0.0, 0.3, 0.1]),
             clamp(Place::End, [0.3, 1.2, 0.4], [0.2, -0.7, 0.5]),
         ];
-        scenario.solver.elements = Some(24);
+        scenario.solver.elements = Some(48);
         Problem::new(scenario).unwrap()
     }
 

@@ -4,7 +4,7 @@ use crate::equilibrium::{Equilibrium, Status, Uncertified, of_solution, solve_ne
 use crate::geometry::{Pose, Wrench, exp};
 use crate::names::named;
 use crate::problem::program::{BeltPoint, BeltProgram, rows_of};
-use crate::problem::{Problem, Units};
+use crate::problem::{Mesh, Problem, Units};
 use crate::scenario::error::ScenarioError;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use stagewise::{Distance, FollowSettings, Followed, Follower, Residuals};
@@ -158,7 +158,8 @@ impl Tracker {
             self.return_to_start();
             return self.refused();
         };
-        let found = solve_near(&problem, self.follower.point(), proceed);
+        let mesh = Mesh::of(&problem, self.follower.program());
+        let found = solve_near(&problem, &mesh, self.follower.point(), proceed);
         self.take(&found, followed)
     }
 

@@ -1,6 +1,8 @@
 //! The intrinsic method: the interior-point search in the two fields bend and rib slope.
 
+use super::accuracy::MeshError;
 use super::active_set::settle;
+use super::refinement::{Level, refine};
 use super::search::{MinimumSettings, Search, is_flat_under_load};
 use super::stability::{self, Stability};
 use super::{Equilibrium, LinkForce, Reaction, Solved, Start, Status};
@@ -12,6 +14,7 @@ use crate::surface::linking::half_turns;
 use nalgebra::Vector3;
 use stagewise::{Inertia, Outcome, Solution, redundant_equalities};
 use std::ops::ControlFlow;
+use std::sync::OnceLock;
 
 /// Residual of the constraints above which they are missed beyond rounding, lengths in U and angles in rad.
 const CLEARLY_MISSED: f64 = 1e-6;
@@ -52,14 +55,22 @@ pub(crate) fn of_solution(
     let redundant = redundant(problem, &program);
     let fault = problem.active_set_fault(&program, &solution.at.point);
     let (status, message) = judge(problem, &solution, fault, redundant.as_deref());
-    let found = Found { program, solution };
+    let found = Found {
+        program,
+        solution,
+        error: OnceLock::new(),
+    };
     equilibrium(problem, found, status, message, redundant)
 }
 
 /// The equilibrium at which a search ended, with all its data.
 fn equilibrium(
     problem: &Problem,
-    Found { program, solution }: Found,
+    Found {
+        program,
+        solution,
+        error,
+    }: Found,
     status: Status,
     message: String,
     redundant: Option<String>,
@@ -82,7 +93,7 @@ fn equilibrium(
         status,
         message,
         warnings: [
-            warnings(problem, &program, status, stability, is_flat),
+            warnings(problem, status, stability, is_flat),
             doubts(status, redundant.as_deref()),
             passed_through_itself(scenario, half_turns),
         ]
@@ -104,7 +115,9 @@ fn equilibrium(
         residuals: solution.residuals,
         iterations: solution.iterations,
         problem: problem.clone(),
+        error,
         solved: Some(Solved {
+            values: solution.values,
             program,
             at: solution.at,
             inertia: solution.inertia,
@@ -118,10 +131,26 @@ fn equilibrium(
 struct Found {
     program: BeltProgram,
     solution: Solution<BeltPoint>,
+    /// The error by the mesh, where it has been estimated.
+    error: OnceLock<Option<MeshError>>,
+}
+
+impl From<Level> for (Found, Option<String>) {
+    /// The end of a search on a mesh, with the fault that keeps its result from being relied on.
+    fn from(level: Level) -> Self {
+        let fault = level.fault();
+        let error = level.estimate.map(|estimate| Some(estimate.error));
+        let found = Found {
+            program: level.program,
+            solution: level.solution,
+            error: error.map_or_else(OnceLock::new, OnceLock::from),
+        };
+        (found, fault)
+    }
 }
 
 impl Search {
-    fn of(problem: &Problem) -> Self {
+    pub(super) fn of(problem: &Problem) -> Self {
         Self {
             bulge: problem.bulge(),
             tolerance: problem.tolerance(),
@@ -134,7 +163,11 @@ impl Search {
 fn start(problem: &Problem) -> Found {
     let program = problem.program(problem.elements());
     let solution = Search::of(problem).start(&program);
-    Found { program, solution }
+    Found {
+        program,
+        solution,
+        error: OnceLock::new(),
+    }
 }
 
 /// The end of a search, with the fault of the active sets of the shape found, if there is one.
@@ -149,11 +182,29 @@ fn find(
         close_barrier,
         ..
     } = search.settings;
-    let mut program = problem.program(problem.elements());
+    let uniform = || problem.program(problem.elements());
+    let mut program = match from {
+        Start::Near(mesh, _) | Start::Minimum(mesh, _) => {
+            problem.program_on(mesh).unwrap_or_else(uniform)
+        }
+        _ => uniform(),
+    };
+    if !problem.has_fixed_mesh() {
+        let start = match from {
+            Start::Guess => Some(None),
+            Start::Shape(shape) | Start::Minimum(_, shape) => Some(Some((&program, shape))),
+            Start::Near(..) | Start::Close(_) => None,
+        };
+        if let Some(start) = start {
+            return refine(problem, &search, start, proceed).into();
+        }
+    }
     let solution = match from {
-        Start::Near(shape) => search.from(&program, shape.clone(), proceed),
+        Start::Near(_, shape) => search.from(&program, shape.clone(), proceed),
         Start::Shape(shape) => search.only_from(&program, shape.clone(), cold_barrier, proceed),
-        Start::Close(shape) => search.only_from(&program, shape.clone(), close_barrier, proceed),
+        Start::Close(shape) | Start::Minimum(_, shape) => {
+            search.only_from(&program, shape.clone(), close_barrier, proceed)
+        }
         Start::Guess => {
             let default = problem.scenario().default_elements();
             let coarse = (problem.elements() > default).then(|| problem.program(default));
@@ -161,7 +212,11 @@ fn find(
         }
     };
     let (solution, fault) = settle(problem, &search, &mut program, solution, proceed);
-    (Found { program, solution }, fault)
+    let mut level = Level::new(program, solution, fault);
+    if level.turns_too_far() {
+        level.estimate(problem);
+    }
+    level.into()
 }
 
 /// The supports and links whose constraints are redundant, by name; `None` where all are independent.
@@ -276,22 +331,13 @@ fn passed_through_itself(scenario: &Scenario, half_turns: Option<i32>) -> Vec<St
 
 fn warnings(
     problem: &Problem,
-    program: &BeltProgram,
     status: Status,
     stability: Option<Stability>,
     is_flat: bool,
 ) -> Vec<String> {
-    /// Elements for each width V that are safe, a number: strong twist makes facets of the scale of V, which longer elements
-    /// cannot resolve.
-    const SAFE: f64 = 8.0;
     /// Thickness from which a belt is no thin strip, in V.
     const THICK: f64 = 0.25;
     let scenario = problem.scenario();
-    let shares = program
-        .elements()
-        .map(|(_, e)| e.length / (2.0 * e.half_width));
-    let longest = shares.fold(0.0, f64::max);
-    let coarse = longest * SAFE > 1.0 + 1e-9;
     let no_slack = status != Status::Infeasible && problem.has_no_slack();
     let flat = status == Status::Converged && is_flat;
     let weightless = scenario.loads.gravity.is_some_and(|g| g != [0.0; 3])
@@ -305,12 +351,6 @@ fn warnings(
         .enumerate()
         .filter_map(more_than_a_turn);
     [
-        coarse.then(|| {
-            format!(
-                "elements of {longest:.2} V may settle on a false level: V/8 is safe, so raise solver.elements to {:.0}",
-                (SAFE * scenario.belt.length() / scenario.belt.width).ceil()
-            )
-        }),
         no_slack.then(|| {
             "the supports leave the belt less than 1e-6 of slack: the reactions are not determined".to_owned()
         }),

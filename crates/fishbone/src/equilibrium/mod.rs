@@ -1,27 +1,32 @@
 //! The equilibrium of a problem: its search and its data.
 
+mod accuracy;
 mod active_set;
 pub(crate) mod guess;
 mod intrinsic;
+mod refinement;
 mod search;
 mod spans;
 mod stability;
 mod warnings;
 
 use crate::names::named;
+pub use accuracy::MeshError;
 pub use stability::Stability;
 pub(crate) use stability::left_free;
 
 use crate::geometry::{Pose, Wrench};
-use crate::problem::Problem;
 use crate::problem::program::{BeltPoint, BeltProgram};
+use crate::problem::{Mesh, Problem};
 use crate::scenario::{SAME_PLACE, Scenario};
 use crate::strip::spine::Spine;
 use crate::surface::{HighestPoint, highest_point};
+use accuracy::Estimate;
 use guess::{guess, waved};
 use nalgebra::{Vector2, Vector3};
-use stagewise::{Inertia, Multipliers, Residuals, Stationary};
+use stagewise::{Inertia, Multipliers, Residuals, Stationary, Values};
 use std::ops::ControlFlow;
+use std::sync::OnceLock;
 use thiserror::Error;
 
 pub(crate) use intrinsic::of_solution;
@@ -89,6 +94,8 @@ pub struct Equilibrium {
     pub residuals: Residuals,
     /// Iterations, over all attempts.
     pub iterations: usize,
+    /// The error by the mesh, once it has been estimated.
+    pub(crate) error: OnceLock<Option<MeshError>>,
     /// The solved programme; `None` where the method has no multipliers.
     pub(crate) solved: Option<Solved>,
 }
@@ -122,6 +129,7 @@ named!(impl Uncertified {
 pub(crate) struct Solved {
     pub(crate) program: BeltProgram,
     pub(crate) at: Stationary<BeltPoint>,
+    pub(crate) values: Values,
     pub(crate) inertia: Option<Inertia>,
     /// The supports and links whose constraints are redundant, by name.
     pub(crate) redundant: Option<String>,
@@ -143,6 +151,17 @@ impl Equilibrium {
     /// The point of the spine farthest along `solver.bulge`.
     pub fn highest_point(&self) -> HighestPoint {
         highest_point(&self.spine, &self.problem.bulge())
+    }
+
+    /// The estimated error by the mesh, found by one Newton step on the mesh of elements half as long; `None` of a solve that
+    /// has not converged by a method with multipliers, and where that mesh has no equilibrium next to this one.
+    pub fn error(&self) -> Option<MeshError> {
+        *self.error.get_or_init(|| {
+            let solved = self.certified().ok()?;
+            let estimate =
+                Estimate::new(&self.problem, &solved.program, &solved.at, &solved.values);
+            Some(estimate?.error)
+        })
     }
 
     /// The programme and its solution, from which every other computation starts, if the solve has converged by a method
@@ -174,6 +193,23 @@ impl Equilibrium {
         };
         let places = self.spine.u.iter().zip(&self.spine.pose);
         places.map(way).fold(0.0, f64::max)
+    }
+
+    /// The same minimum on a mesh that follows the error, for a problem that asks for this; `None` where this leads to no
+    /// minimum, and of a saddle.
+    pub(crate) fn refined_for(
+        &self,
+        problem: &Problem,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Option<Self> {
+        let solved = self.solved.as_ref()?;
+        let is_minimum = self.stability.is_none_or(|s| s.negative_modes == 0);
+        if problem.has_fixed_mesh() || !is_minimum {
+            return None;
+        }
+        let mesh = Mesh::of(&self.problem, &solved.program);
+        let found = intrinsic::solve(problem, Start::Minimum(&mesh, &solved.at.point), proceed);
+        (found.status == Status::Converged).then_some(found)
     }
 
     /// The same equilibrium, minimum or not, on a mesh of another number of elements; `None` if no equilibrium is found next
@@ -219,8 +255,10 @@ impl Equilibrium {
 enum Start<'a> {
     /// At the guess.
     Guess,
-    /// At a shape near to a minimum; at the guess if this leads to no minimum.
-    Near(&'a BeltPoint),
+    /// On a mesh, at a shape near to a minimum; at the guess if this leads to no minimum.
+    Near(&'a Mesh, &'a BeltPoint),
+    /// On meshes that follow the error, the first of which is given, at a minimum, and nowhere else.
+    Minimum(&'a Mesh, &'a BeltPoint),
     /// At a shape that need not be near to a minimum, and nowhere else.
     Shape(&'a BeltPoint),
     /// At a shape very near to a minimum, and nowhere else.
@@ -259,17 +297,18 @@ pub(crate) fn from_fields(
     minimum_from(problem, &shape, proceed)
 }
 
-/// The equilibrium from a shape on the problem's mesh that is near to a minimum; from the guess if this shape leads to no
-/// minimum.
+/// The equilibrium on a mesh from a shape that is near to a minimum; from the guess if this shape leads to no minimum.
 pub(crate) fn solve_near(
     problem: &Problem,
+    mesh: &Mesh,
     shape: &BeltPoint,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Equilibrium {
-    intrinsic::solve(problem, Start::Near(shape), proceed)
+    intrinsic::solve(problem, Start::Near(mesh, shape), proceed)
 }
 
-/// The minimum that a search finds from a shape on the problem's mesh, and from nowhere else.
+/// The minimum that a search finds from a shape on the uniform mesh of the problem's number of elements, and from nowhere
+/// else.
 pub(crate) fn minimum_from(
     problem: &Problem,
     shape: &BeltPoint,
@@ -278,7 +317,7 @@ pub(crate) fn minimum_from(
     intrinsic::solve(problem, Start::Shape(shape), proceed)
 }
 
-/// The minimum next to a shape on the problem's mesh.
+/// The minimum next to a shape on the uniform mesh of the problem's number of elements.
 pub(crate) fn minimum_next_to(
     problem: &Problem,
     shape: &BeltPoint,

@@ -296,19 +296,25 @@ fn rank(solution: &Solution<BeltPoint>) -> u8 {
     }
 }
 
-/// A shape prolonged to another mesh.
+/// A shape prolonged to another mesh, its ribs a little off the bound.
 pub(super) fn prolong(from: &BeltProgram, point: &BeltPoint, to: &BeltProgram) -> BeltPoint {
+    inside(to, prolonged(from, point, to))
+}
+
+/// A shape prolonged to another mesh.
+pub(super) fn prolonged(from: &BeltProgram, point: &BeltPoint, to: &BeltProgram) -> BeltPoint {
     let (nodes, known) = (to.nodes(), from.nodes());
     let after_joint = |k: usize| k > 0 && matches!(to.pieces[k - 1], Piece::Joint { .. });
     let places = nodes.iter().enumerate();
     let fields: Vec<_> = places
         .map(|(k, u)| fields_at(from, &known, point, *u, after_joint(k)))
         .collect();
-    let prolonged = BeltPoint {
+    let mut prolonged = BeltPoint {
         poses: vec![point.poses[0]; fields.len()],
         fields,
     };
-    inside(to, prolonged)
+    to.settle(&mut prolonged);
+    prolonged
 }
 
 /// The inequalities' multipliers prolonged to another mesh: the multipliers of a stage are shared out by length.

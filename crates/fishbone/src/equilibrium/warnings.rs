@@ -15,8 +15,52 @@ impl Equilibrium {
     pub(crate) fn warnings_with(&self, crossing: Option<[f64; 2]>) -> Vec<String> {
         let crossing = crossing.filter(|_| self.status == Status::Converged);
         let scales = implausible_scales(&self.scenario().belt);
-        let solve = self.warnings.iter().cloned();
+        let solve = self.warnings.iter().cloned().chain(self.inaccurate());
         solve.chain(scales).chain(crossing.map(crossed)).collect()
+    }
+}
+
+impl Equilibrium {
+    /// The warning of a mesh that is too coarse: for the width where the scenario fixes it, else for the accuracy.
+    fn inaccurate(&self) -> Option<String> {
+        let (accuracy, fixed) = (self.problem.accuracy(), self.problem.has_fixed_mesh());
+        if let Some(warning) = self.too_coarse_for_width().filter(|_| fixed) {
+            return Some(warning);
+        }
+        self.certified().ok()?;
+        let Some(error) = self.error() else {
+            return Some(
+                "the error by the mesh could not be estimated: a mesh twice as fine has no equilibrium next to this one"
+                    .to_owned(),
+            );
+        };
+        let (name, largest) = error.worst();
+        let remedy = match fixed {
+            true => "leave out solver.elements, or raise it",
+            false => "no mesh tried is fine enough",
+        };
+        (largest > accuracy).then(|| {
+            format!(
+                "the estimated error of the {name}, {largest:.1e}, is above solver.accuracy, {}: {remedy}",
+                number(accuracy)
+            )
+        })
+    }
+
+    fn too_coarse_for_width(&self) -> Option<String> {
+        /// Elements for each width V that are safe, a number: strong twist makes facets of the scale of V, which longer
+        /// elements cannot resolve.
+        const SAFE: f64 = 8.0;
+        let (spine, width) = (&self.spine, self.spine.width);
+        let longest = spine.strips().map(|element| spine.element_length(element));
+        let longest = longest.fold(0.0, f64::max) / width;
+        (longest * SAFE > 1.0 + 1e-9).then(|| {
+            format!(
+                "elements of {longest:.2} V may settle on a false level: V/8 is safe, so leave out solver.elements, or raise it \
+                 to {:.0}",
+                (SAFE * spine.length() / width).ceil()
+            )
+        })
     }
 }
 

@@ -1,6 +1,6 @@
 //! The result schema `fishbone.result/1`: an equilibrium in JSON.
 
-use crate::equilibrium::{Equilibrium, LinkForce, Status};
+use crate::equilibrium::{Equilibrium, LinkForce, MeshError, Status};
 use crate::geometry::Wrench;
 use crate::scenario::Scenario;
 use crate::strip::developable::EnergyModel;
@@ -49,6 +49,7 @@ pub(crate) struct Record<'a> {
     negative_modes: Option<usize>,
     zero_modes: Option<usize>,
     residuals: Residuals,
+    error: Option<Error>,
     iterations: usize,
     scenario: &'a Scenario,
 }
@@ -134,6 +135,26 @@ struct Residuals {
     complementarity: f64,
 }
 
+/// Estimated relative errors by the mesh; null where a quantity is not determined.
+#[derive(Debug, Clone, Serialize)]
+struct Error {
+    energy: f64,
+    position: Option<f64>,
+    force: f64,
+    radius: f64,
+}
+
+impl Error {
+    fn new(error: MeshError) -> Self {
+        Self {
+            energy: error.energy,
+            position: Some(error.position).filter(|error| !error.is_nan()),
+            force: error.force,
+            radius: error.radius,
+        }
+    }
+}
+
 impl Equilibrium {
     /// The result as one JSON object, schema [`SCHEMA`]; the same text for the same equilibrium.
     pub fn to_json(&self) -> String {
@@ -194,6 +215,7 @@ impl<'a> Record<'a> {
                 constraint: equilibrium.residuals.constraint,
                 complementarity: equilibrium.residuals.complementarity,
             },
+            error: equilibrium.error().map(Error::new),
             iterations: equilibrium.iterations,
             scenario: equilibrium.scenario(),
         }

@@ -2,7 +2,7 @@
 
 use super::Problem;
 use crate::geometry::Pose;
-use crate::problem::belt::Break;
+use crate::problem::belt::{Break, Division};
 use crate::problem::program::{
     self, BeltPoint, BeltProgram, DeadForce, Hold, NodeLink, NodeLoad, NodeSupport, Tie,
 };
@@ -12,22 +12,33 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use std::f64::consts::PI;
 
 impl Problem {
-    /// The programme on a mesh of about `count` elements, without active edges.
+    /// The programme on a mesh of about `count` elements of equal length, without active edges.
     ///
     /// Its supports are the scenario's in their order, or one at the start if the scenario has none; its links are the
     /// scenario's, then the seam of a closed belt.
     pub fn program(&self, count: usize) -> BeltProgram {
-        self.program_of(self.belt.pieces(count, &self.breaks()))
+        let program = self.program_divided(&self.divided(count));
+        program.expect("a division for every stretch")
     }
 
-    /// Number of elements of every stretch of the belt on a mesh of about `count`.
-    pub(super) fn shares(&self, count: usize) -> Vec<usize> {
-        self.belt.shares(count, &self.breaks())
+    /// The stretches of the belt, divided into about `count` elements of equal length.
+    pub(super) fn divided(&self, count: usize) -> Vec<Division> {
+        self.belt.divided(count, &self.breaks())
     }
 
-    /// The programme with given numbers of elements, one a stretch; `None` where the belt has another number of stretches.
-    pub(super) fn program_shared(&self, shares: &[usize]) -> Option<BeltProgram> {
-        let pieces = self.belt.pieces_shared(shares, &self.breaks())?;
+    /// The stretches of the belt, divided as in a programme.
+    pub(super) fn division_of(&self, program: &BeltProgram) -> Vec<Division> {
+        self.belt.division_of(&program.pieces, &self.breaks())
+    }
+
+    /// Lengths of the stretches of the belt, in U.
+    pub(super) fn lengths_of_stretches(&self) -> Vec<f64> {
+        self.belt.lengths_of_stretches(&self.breaks())
+    }
+
+    /// The programme with given divisions, one a stretch; `None` where the belt has another number of stretches.
+    pub(super) fn program_divided(&self, divisions: &[Division]) -> Option<BeltProgram> {
+        let pieces = self.belt.pieces(divisions, &self.breaks())?;
         Some(self.program_of(pieces))
     }
 
@@ -112,7 +123,7 @@ impl Problem {
     }
 
     /// Whether a closed belt is free of loads and links and has at most one support, which then bears nothing.
-    fn is_left_alone(&self) -> bool {
+    pub(crate) fn is_left_alone(&self) -> bool {
         let loads = &self.scenario.loads;
         let unloaded = self.weight() == Vector3::zeros() && loads.points.is_empty();
         self.belt.half_turns.is_some() && self.scenario.supports.len() <= 1 && unloaded

@@ -59,6 +59,26 @@ pub(crate) struct Break {
     pub jump: bool,
 }
 
+/// The lengths of the elements of a stretch, as shares of its length; of a stiffened stretch, which is one piece, none.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Division(pub Vec<f64>);
+
+impl Division {
+    /// Elements of equal length.
+    pub(crate) fn equal(count: usize) -> Self {
+        Self(vec![1.0 / count as f64; count])
+    }
+
+    /// Every element's start and length, in shares.
+    fn places(&self) -> impl Iterator<Item = [f64; 2]> {
+        self.0.iter().scan(0.0, |start, share| {
+            let from = *start;
+            *start += share;
+            Some([from, *share])
+        })
+    }
+}
+
 /// A stretch of a segment between two breaks.
 struct Stretch<'a> {
     segment: &'a Segment,
@@ -70,6 +90,10 @@ struct Stretch<'a> {
 }
 
 impl Stretch<'_> {
+    fn length(&self) -> f64 {
+        self.to - self.from
+    }
+
     /// Least number of elements that the stretch needs where its rigidity changes along it: bend goes with the inverse of
     /// rigidity.
     fn fewest(&self) -> usize {
@@ -240,44 +264,69 @@ impl Belt {
         }
     }
 
-    /// The pieces of a mesh of `count` elements, shared out by length. There are more elements where a share is not whole,
-    /// between two breaks, ends of segments or entries of a table of rigidity. A stiffened stretch is one piece.
+    /// Every stretch of the belt divided into elements of equal length, of about `count` in all, shared out by length. There
+    /// are more where a share is not whole, between two breaks, ends of segments or entries of a table of rigidity.
+    pub(crate) fn divided(&self, count: usize, breaks: &[Break]) -> Vec<Division> {
+        let of_length = |stretch: &Stretch| stretch.length() / self.length();
+        let divided = |stretch: &Stretch| {
+            Division::equal(match stretch.segment {
+                Segment::Strip(_) => share(count, of_length(stretch)).max(stretch.fewest()),
+                Segment::Rigid { .. } | Segment::Corner { .. } => 0,
+            })
+        };
+        self.stretches(breaks).iter().map(divided).collect()
+    }
+
+    /// The division of every stretch into the given pieces.
+    pub(crate) fn division_of(&self, pieces: &[Piece], breaks: &[Break]) -> Vec<Division> {
+        let mut pieces = pieces
+            .iter()
+            .filter(|piece| !matches!(piece, Piece::Joint { .. }));
+        let divided = |stretch: &Stretch| {
+            let whole = stretch.length() / self.length();
+            let (mut done, mut shares) = (0.0, Vec::new());
+            while done < whole - SAME_PLACE
+                && let Some(piece) = pieces.next()
+            {
+                done += piece.length();
+                if let Piece::Strip(element) = piece {
+                    shares.push(element.length / whole);
+                }
+            }
+            Division(shares)
+        };
+        self.stretches(breaks).iter().map(divided).collect()
+    }
+
+    /// The pieces of a mesh; `None` where the belt has another number of stretches. A stiffened stretch is one piece.
     ///
     /// Units: lengths in U, rigidity in its mean.
-    pub(crate) fn pieces(&self, count: usize, breaks: &[Break]) -> Vec<Piece> {
-        let shared = self.pieces_shared(&self.shares(count, breaks), breaks);
-        shared.expect("a share for every stretch")
-    }
-
-    /// Number of elements of every stretch, of `count` in all.
-    pub(crate) fn shares(&self, count: usize, breaks: &[Break]) -> Vec<usize> {
-        let of_length = |stretch: &Stretch| (stretch.to - stretch.from) / self.length();
-        let stretches = self.stretches(breaks);
-        let share = |stretch: &Stretch| share(count, of_length(stretch)).max(stretch.fewest());
-        stretches.iter().map(share).collect()
-    }
-
-    /// The pieces of a mesh with given numbers of elements, one a stretch; `None` where the belt has another number of
-    /// stretches.
-    pub(crate) fn pieces_shared(&self, shares: &[usize], breaks: &[Break]) -> Option<Vec<Piece>> {
+    pub(crate) fn pieces(&self, mesh: &[Division], breaks: &[Break]) -> Option<Vec<Piece>> {
         let (length, rigidity) = (self.length(), self.mean_rigidity());
         let stretches = self.stretches(breaks);
-        if stretches.len() != shares.len() {
+        if stretches.len() != mesh.len() {
             return None;
         }
         let mut pieces = Vec::new();
-        for (stretch, share) in stretches.iter().zip(shares) {
+        for (stretch, division) in stretches.iter().zip(mesh) {
             pieces.extend(stretch.joint);
             match stretch.segment {
                 Segment::Strip(strip) => {
-                    pieces.extend(self.elements(strip, stretch, *share, [length, rigidity]));
+                    pieces.extend(self.elements(strip, stretch, division, [length, rigidity]));
                 }
                 Segment::Rigid { .. } | Segment::Corner { .. } => pieces.push(Piece::Rigid {
-                    length: (stretch.to - stretch.from) / length,
+                    length: stretch.length() / length,
                 }),
             }
         }
         Some(pieces)
+    }
+
+    /// Lengths of the stretches between breaks, ends of segments and entries of tables, in U.
+    pub(crate) fn lengths_of_stretches(&self, breaks: &[Break]) -> Vec<f64> {
+        let stretches = self.stretches(breaks);
+        let lengths = stretches.iter().map(Stretch::length);
+        lengths.map(|length| length / self.length()).collect()
     }
 
     fn stretches(&self, breaks: &[Break]) -> Vec<Stretch<'_>> {
@@ -321,14 +370,14 @@ impl Belt {
         &self,
         strip: &Strip,
         stretch: &Stretch,
-        count: usize,
+        division: &Division,
         [length, rigidity]: [f64; 2],
     ) -> impl Iterator<Item = Piece> {
-        let (from, step) = (stretch.from, (stretch.to - stretch.from) / count as f64);
-        (0..count).map(move |k| {
-            let at = |t: f64| strip.rigidity_at(from + (k as f64 + t) * step) / rigidity;
+        let (from, whole) = (stretch.from, stretch.length());
+        division.places().map(move |[start, share]| {
+            let at = |t: f64| strip.rigidity_at(from + (start + t * share) * whole) / rigidity;
             Piece::Strip(Element {
-                length: step / length,
+                length: share * whole / length,
                 geodesic: strip.geodesic * length,
                 rigidity: gauss_points().map(at),
                 half_width: 0.5 * self.width / length,
@@ -372,6 +421,21 @@ mod tests {
         }
     }
 
+    fn pieces_of(belt: &Belt, count: usize, breaks: &[Break]) -> Vec<Piece> {
+        let mesh = belt.divided(count, breaks);
+        let pieces = belt.pieces(&mesh, breaks).unwrap();
+        let close = |(a, b): (&Division, &Division)| {
+            a.0.len() == b.0.len() && a.0.iter().zip(&b.0).all(|(a, b)| (a - b).abs() < 1e-12)
+        };
+        assert!(
+            belt.division_of(&pieces, breaks)
+                .iter()
+                .zip(&mesh)
+                .all(close)
+        );
+        pieces
+    }
+
     fn kinds(pieces: &[Piece]) -> String {
         let kind = |piece: &Piece| match piece {
             Piece::Strip(_) => 's',
@@ -390,7 +454,8 @@ mod tests {
 
     #[test]
     fn test_elements_are_in_units_of_length_and_mean_rigidity() {
-        let pieces = belt(vec![strip(1.5, 0.0, 2.0), strip(0.5, 0.0, 2.0)]).pieces(8, &[]);
+        let belt = belt(vec![strip(1.5, 0.0, 2.0), strip(0.5, 0.0, 2.0)]);
+        let pieces = pieces_of(&belt, 8, &[]);
         assert_eq!(kinds(&pieces), "ssssssss");
         for piece in pieces {
             let Piece::Strip(element) = piece else {
@@ -414,7 +479,7 @@ mod tests {
             Segment::Rigid { length: 1.0 },
             strip(1.0, 0.0, 1.0),
         ];
-        let pieces = belt(segments).pieces(6, &[]);
+        let pieces = pieces_of(&belt(segments), 6, &[]);
         assert_eq!(kinds(&pieces), "sjsjsjsjrjs");
         assert_eq!(pieces[1], Piece::Joint { angle: 0.75 });
         assert_eq!(pieces[3], Piece::Joint { angle: 0.0 });
@@ -429,7 +494,7 @@ mod tests {
             at(0.5, true),
             at(0.5 + 1e-12, false),
         ];
-        let pieces = belt(vec![strip(1.0, 0.0, 1.0)]).pieces(10, &breaks);
+        let pieces = pieces_of(&belt(vec![strip(1.0, 0.0, 1.0)]), 10, &breaks);
         assert_eq!(kinds(&pieces), "sssssjsssss");
         let lengths: f64 = pieces[..3].iter().map(Piece::length).sum();
         assert!((lengths - 0.3).abs() < 1e-12);
@@ -448,7 +513,7 @@ mod tests {
             curl: Curl::default(),
         })]);
         assert!((belt.mean_rigidity() - 2.0).abs() < 1e-15);
-        let pieces = belt.pieces(20, &[]);
+        let pieces = pieces_of(&belt, 20, &[]);
         let Piece::Strip(element) = pieces[0] else {
             unreachable!()
         };

@@ -206,9 +206,25 @@ impl Problem {
         self.origin
     }
 
-    /// Number of elements, in all.
+    /// Number of elements of a mesh that is to suit many shapes.
     pub fn elements(&self) -> usize {
         self.scenario.elements()
+    }
+
+    /// The largest estimated error by the mesh that is asked for, relative.
+    pub(crate) fn accuracy(&self) -> f64 {
+        self.scenario.solver.accuracy
+    }
+
+    /// Whether the scenario names the number of elements.
+    pub(crate) fn has_fixed_mesh(&self) -> bool {
+        self.scenario.solver.elements.is_some()
+    }
+
+    /// Arc lengths where elements must meet, in U.
+    pub(crate) fn break_points(&self) -> Vec<f64> {
+        let points = self.scenario.break_points();
+        points.iter().map(|u| u / self.units.length).collect()
     }
 
     /// The direction along which the belt should bulge, world axes; of any length.

@@ -139,6 +139,16 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         cut
     }
 
+    /// The programme of a belt as many times as wide, of the same rigidity.
+    pub(crate) fn widened(mut self, factor: f64) -> Self {
+        for piece in &mut self.pieces {
+            if let Piece::Strip(element) = piece {
+                element.half_width *= factor;
+            }
+        }
+        self
+    }
+
     /// Fields that a stiffened stretch prescribes at a node: no bend inside, square ribs at its ends too.
     fn fixed_by_pieces(&self, node: usize) -> [Option<f64>; F] {
         let beside = [node.checked_sub(1), Some(node)];

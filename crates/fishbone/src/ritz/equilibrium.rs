@@ -8,6 +8,7 @@ use crate::strip::spine::{Piece, Spine};
 use nalgebra::Vector3;
 use stagewise::Residuals;
 use std::ops::ControlFlow;
+use std::sync::OnceLock;
 
 /// Solves a belt clamped at both ends.
 pub(crate) fn solve(
@@ -57,6 +58,7 @@ fn report(problem: &Problem, start: &Pose, solution: &Solution) -> Equilibrium {
         None => (Status::NotConverged, message(solution)),
     };
     Equilibrium {
+        error: OnceLock::from(None),
         problem: problem.clone(),
         status,
         message,

@@ -38,7 +38,7 @@ impl Scenario {
         }
     }
 
-    /// Number of elements: the solver's own, or 8 U/V and at least 80.
+    /// Number of elements of a mesh that is to suit many shapes: the solver's own, or 8 U/V and at least 80.
     ///
     /// Elements longer than V/4 give false energy levels; V/8 is safe.
     pub(crate) fn elements(&self) -> usize {
@@ -78,11 +78,11 @@ impl Scenario {
     }
 }
 
-/// 8 U/V rounded up, at least 80; saturates.
+/// 8 U/V rounded up, 80 to 100 000.
 fn default_elements(length: f64, width: f64) -> usize {
     // A decimal U/V such as 0.3/0.1 comes out an ulp too large or too small; it shall not cost one more element.
     let exact = 8.0 * length / width;
-    ((exact - 1e-9 * exact).ceil() as usize).max(80)
+    ((exact - 1e-9 * exact).ceil() as usize).clamp(80, 100_000)
 }
 
 impl BeltSpec {

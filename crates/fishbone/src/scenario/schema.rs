@@ -311,7 +311,11 @@ table! {
     pub struct SolverSpec {
         /// The method of solution.
         pub method: Method,
-        /// Number of elements in all, shared out by length. Default: 8 U/V, at least 80.
+        /// Largest estimated error that the mesh may make, relative: of the energy, the spine (over U), the reactions and the
+        /// tightest bend on the spine. Elements are as short as this needs.
+        #[schemars(range(min = 1e-6, max = 0.1))]
+        pub accuracy: f64,
+        /// Number of elements in all, of equal length, shared out by length, in place of a mesh by `accuracy`.
         #[serde(skip_serializing_if = "Option::is_none")]
         #[schemars(range(min = 4, max = 100_000))]
         pub elements: Option<usize>,
@@ -329,6 +333,7 @@ impl Default for SolverSpec {
     fn default() -> Self {
         Self {
             method: Method::default(),
+            accuracy: 1e-3,
             elements: None,
             tolerance: 1e-8,
             bulge: [1.0, 0.0, 0.0],

@@ -1,11 +1,13 @@
 //! Primal–dual interior-point minimisation: main loop.
 
 mod barrier;
+mod correction;
 mod filter;
 mod line_search;
 mod primal_dual;
 mod restoration;
 
+pub use correction::{Correction, correct};
 pub(crate) use primal_dual::PrimalDual;
 
 use crate::larger;

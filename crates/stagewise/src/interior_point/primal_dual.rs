@@ -127,6 +127,11 @@ impl<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> Primal
         }
     }
 
+    /// Sets the barrier parameter to the one at which a point of a residual counts as converged.
+    pub(crate) fn set_barrier(&mut self, tolerance: f64) {
+        self.barrier.parameter = 0.1 * tolerance / self.barrier.heaviest();
+    }
+
     /// Inertia of the second variation. Overwrites the derivatives.
     pub(crate) fn inertia(&mut self) -> Option<Inertia> {
         let metric = self.program.metric(&self.point);

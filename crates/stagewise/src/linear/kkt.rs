@@ -168,6 +168,19 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         }
     }
 
+    /// The assembled second derivatives by the controls of every node alone.
+    pub(crate) fn control_curvatures(&self) -> Vec<SMatrix<f64, U, U>> {
+        let mut curvatures = vec![SMatrix::zeros(); self.step.len()];
+        for (k, stage) in self.diagonal.controls.iter().enumerate() {
+            curvatures[k] += stage.first;
+            curvatures[k + 1] += stage.second;
+        }
+        for term in &self.diagonal.nodes {
+            curvatures[term.node] += term.hessian.fixed_view::<U, U>(X, X);
+        }
+        curvatures
+    }
+
     fn assemble_border(&mut self) {
         let linear = &self.linear;
         let (equalities, inequalities) = self

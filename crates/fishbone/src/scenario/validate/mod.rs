@@ -15,6 +15,8 @@ use std::ops::RangeInclusive;
 /// equilibrium.
 const TOLERANCES: RangeInclusive<f64> = 1e-13..=1e-2;
 
+/// Estimated errors that may be asked for, relative.
+const ACCURACIES: RangeInclusive<f64> = 1e-6..=0.1;
 /// Elements of the mesh, a number.
 const ELEMENTS: RangeInclusive<usize> = 4..=100_000;
 /// Basis functions of each unknown of the Ritz method, a number.
@@ -61,20 +63,17 @@ impl Scenario {
     }
 
     fn check_elements(&self) -> Check {
-        let elements = self.elements();
-        let source = if self.solver.elements.is_some() {
-            ""
-        } else {
-            " by default (8 U/V)"
+        let Some(elements) = self.solver.elements else {
+            return Ok(());
         };
         let field = format_args!("solver.elements");
         require(ELEMENTS.contains(&elements), field, || {
-            (format!("{elements}{source}"), between(&ELEMENTS))
+            (elements.to_string(), between(&ELEMENTS))
         })?;
         let least = self.break_points().len() - 1;
         require(least <= elements, field, || {
             (
-                format!("{elements}{source}"),
+                elements.to_string(),
                 format!(
                     "at least {least}, one a stretch between joints, supports, links and point loads"
                 ),
@@ -143,6 +142,12 @@ impl SolverSpec {
             TOLERANCES.contains(&tolerance),
             format_args!("solver.tolerance"),
             || (number(tolerance), span(&TOLERANCES)),
+        )?;
+        let accuracy = self.accuracy;
+        require(
+            ACCURACIES.contains(&accuracy),
+            format_args!("solver.accuracy"),
+            || (number(accuracy), span(&ACCURACIES)),
         )?;
         finite_vector(format_args!("solver.bulge"), &self.bulge)?;
         let norm = Vector3::from(self.bulge).norm();

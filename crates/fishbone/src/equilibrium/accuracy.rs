@@ -1,0 +1,246 @@
+//! The error that the mesh makes, estimated by one Newton step on the mesh of elements half as long.
+
+use super::guess::inside;
+use super::search::{Search, prolong_inequalities, prolonged};
+use crate::problem::program::{BeltPoint, BeltProgram, Piece};
+use crate::problem::{Mesh, Problem};
+use crate::strip::spine::Spine;
+use crate::surface::least_spine_radius;
+use nalgebra::Vector3;
+use stagewise::{Multipliers, Outcome, Solution, Stationary, Values};
+use std::ops::ControlFlow;
+
+/// Estimated errors of a result by its mesh, relative and not negative; NaN where a quantity is not determined.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeshError {
+    /// Error of the energy over the energy, or over the elastic energy where that is larger.
+    pub energy: f64,
+    /// Largest error of a position on the spine over U; NaN of a belt that may slide along itself.
+    pub position: f64,
+    /// Largest error of a reaction or link force over the largest of them, forces in R_f/U² and moments in R_f/U; 0 where
+    /// all are zero.
+    pub force: f64,
+    /// Error of the tightest bend on the spine over this bend; 0 of a flat belt.
+    pub radius: f64,
+}
+
+impl MeshError {
+    /// The largest of the errors.
+    pub(super) fn largest(&self) -> f64 {
+        self.worst().1
+    }
+
+    /// The largest of the errors, with the name of its quantity.
+    pub(super) fn worst(&self) -> (&'static str, f64) {
+        let errors = [
+            ("energy", self.energy),
+            ("position", self.position),
+            ("force", self.force),
+            ("radius", self.radius),
+        ];
+        let known = errors.into_iter().filter(|(_, error)| !error.is_nan());
+        known.fold(("energy", 0.0), |worst, error| {
+            if error.1 > worst.1 { error } else { worst }
+        })
+    }
+
+    /// The largest of the errors to which all elements contribute: all but that of the radius.
+    pub(super) fn of_the_whole(&self) -> f64 {
+        self.energy.max(self.position).max(self.force)
+    }
+
+    fn times(&self, factor: f64) -> Self {
+        Self {
+            energy: factor * self.energy,
+            position: factor * self.position,
+            force: factor * self.force,
+            radius: factor * self.radius,
+        }
+    }
+}
+
+/// The estimated error of a solution, and what its elements contribute.
+#[derive(Debug, Clone)]
+pub(super) struct Estimate {
+    pub(super) error: MeshError,
+    /// By how much splitting each element alone would lower the energy, in mean R_f/U; positive.
+    pub(super) gains: Vec<f64>,
+    /// Curvature |κ₁| in each element on the finer mesh, the largest, and its largest change from this mesh, in 1/U.
+    pub(super) curvatures: Vec<[f64; 2]>,
+}
+
+impl Estimate {
+    /// The estimate for a solution of a problem's programme; `None` where the finer mesh has no solution next to it.
+    ///
+    /// The error of a quantity that converges with the square of the length of elements is 4/3 of its change on halving
+    /// them, and nearer to the change itself of one that converges faster.
+    pub(super) fn new(
+        problem: &Problem,
+        program: &BeltProgram,
+        at: &Stationary<BeltPoint>,
+        values: &Values,
+    ) -> Option<Self> {
+        /// Error over its change on halving all elements, dimensionless.
+        const OVER_CHANGE: f64 = 1.2;
+        /// Change from which one Newton step tells nothing, dimensionless.
+        const WILD: f64 = 0.02;
+        let fine = problem.program_on(&Mesh::of(problem, program).halved())?;
+        let inequalities = &at.multipliers.inequalities;
+        let point = prolonged(program, &at.point, &fine);
+        // On an arc, ribs that nearly meet in an element meet in one of its halves.
+        let ribs_meet = fine.least_slack(&point) <= 0.0;
+        let near = Stationary {
+            point: match ribs_meet {
+                true => inside(&fine, point),
+                false => point,
+            },
+            multipliers: Multipliers {
+                equalities: at.multipliers.equalities.clone(),
+                inequalities: prolong_inequalities(program, inequalities, &fine),
+            },
+        };
+        let own = Quantities::of(
+            problem,
+            program,
+            &at.point,
+            &at.multipliers.equalities,
+            values.objective,
+        );
+        let step = stagewise::correct(&fine, problem.tolerance(), near.clone())?;
+        let mut better = (step.point, step.equalities, step.objective);
+        let mut error = own.off_on(problem, &fine, &better);
+        if (ribs_meet || error.largest() > WILD)
+            && let Some(solution) = solved_near(problem, &fine, &near)
+        {
+            let Stationary { point, multipliers } = solution.at;
+            better = (point, multipliers.equalities, solution.values.objective);
+            error = own.off_on(problem, &fine, &better);
+        }
+        let strips = fine.pieces.iter().enumerate();
+        let strips = strips.filter(|(_, piece)| matches!(piece, Piece::Strip(_)));
+        let middles = strips.step_by(2).map(|(k, _)| k + 1);
+        let curvature = |point: &BeltPoint, node: usize| {
+            let [bend, slope] = point.fields[node].into();
+            (bend * (1.0 + slope * slope)).abs()
+        };
+        let in_element = |middle: usize| {
+            let nodes = [middle - 1, middle, middle + 1];
+            let curvatures =
+                nodes.map(|node| [&better.0, &near.point].map(|point| curvature(point, node)));
+            let most = curvatures.iter().map(|[better, _]| *better);
+            let change = curvatures.iter().map(|[better, own]| (better - own).abs());
+            [most.fold(0.0, f64::max), change.fold(0.0, f64::max)]
+        };
+        error.of_the_whole().is_finite().then(|| Self {
+            error: error.times(OVER_CHANGE),
+            gains: middles
+                .clone()
+                .map(|middle| step.gains[middle].max(f64::MIN_POSITIVE))
+                .collect(),
+            curvatures: middles.map(in_element).collect(),
+        })
+    }
+}
+
+/// The equilibrium of a programme near to a point: by Newton's method, else the minimum that a search from there finds.
+fn solved_near(
+    problem: &Problem,
+    program: &BeltProgram,
+    near: &Stationary<BeltPoint>,
+) -> Option<Solution<BeltPoint>> {
+    stagewise::settle(program, problem.tolerance(), near.clone()).or_else(|| {
+        let search = Search::of(problem);
+        let barrier = search.settings.warm_barrier;
+        let proceed = &mut || ControlFlow::Continue(());
+        let found = search.only_from(program, near.point.clone(), barrier, proceed);
+        (found.outcome == Outcome::Converged).then_some(found)
+    })
+}
+
+/// The quantities of which the error is estimated.
+struct Quantities {
+    /// Total potential with its zero at the world's origin, in mean R_f/U.
+    energy: f64,
+    elastic_energy: f64,
+    spine: Spine,
+    /// Whether the belt may slide along itself, so that no position is determined.
+    may_slide: bool,
+    /// Forces and moments of supports, and forces of links, in R_f/U² and R_f/U.
+    forces: Vec<Vector3<f64>>,
+    /// Forces and moments along the belt.
+    internal: Vec<Vector3<f64>>,
+    /// The largest curvature on the spine.
+    curvature: f64,
+}
+
+impl Quantities {
+    fn of(
+        problem: &Problem,
+        program: &BeltProgram,
+        point: &BeltPoint,
+        equalities: &[f64],
+        objective: f64,
+    ) -> Self {
+        let spine = problem.spine(program, point);
+        let reactions = program.reactions(point, equalities).into_iter();
+        let reactions = reactions.flat_map(|(force, moment)| [force, moment]);
+        Self {
+            energy: objective + problem.potential_of_origin() / problem.units().energy,
+            elastic_energy: program.elastic_energy(&point.fields),
+            forces: reactions.chain(program.link_forces(equalities)).collect(),
+            internal: program
+                .internal(point, equalities)
+                .into_iter()
+                .flat_map(|(force, moment)| [force, moment])
+                .collect(),
+            curvature: least_spine_radius(&spine).map_or(0.0, |least| least.value.recip()),
+            spine,
+            may_slide: problem.is_left_alone(),
+        }
+    }
+
+    /// By how much these are off those of a better point, with its multipliers and objective, of a programme.
+    fn off_on(
+        &self,
+        problem: &Problem,
+        program: &BeltProgram,
+        (point, equalities, objective): &(BeltPoint, Vec<f64>, f64),
+    ) -> MeshError {
+        self.off(&Self::of(problem, program, point, equalities, *objective))
+    }
+
+    /// By how much these are off better ones, relative.
+    fn off(&self, better: &Self) -> MeshError {
+        let nodes = self.spine.u.iter().zip(&self.spine.pose);
+        let moves = nodes.map(|(u, pose)| {
+            let there = better.spine.at(*u).pose.position;
+            (there - pose.position).norm()
+        });
+        let largest = |forces: &[Vector3<f64>]| forces.iter().map(|f| f.norm()).fold(0.0, f64::max);
+        let pairs = self.forces.iter().zip(&better.forces);
+        let changes = pairs.map(|(own, better)| (own - better).norm());
+        let energies = [better.energy.abs(), better.elastic_energy];
+        MeshError {
+            energy: share(self.energy - better.energy, energies[0].max(energies[1])),
+            position: match self.may_slide {
+                true => f64::NAN,
+                false => moves.fold(0.0, f64::max) / self.spine.length(),
+            },
+            force: share(
+                changes.fold(0.0, f64::max),
+                largest(&better.forces).max(largest(&better.internal)),
+            ),
+            radius: share(self.curvature - better.curvature, better.curvature),
+        }
+    }
+}
+
+/// A change as a share of the whole; 0 of nothing.
+fn share(change: f64, whole: f64) -> f64 {
+    /// A whole that is nothing but rounding, in mean R_f/U and U.
+    const NOTHING: f64 = 1e-7;
+    match whole > NOTHING {
+        true => (change / whole).abs(),
+        false => 0.0,
+    }
+}

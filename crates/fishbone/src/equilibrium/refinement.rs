@@ -1,0 +1,369 @@
+//! The mesh that follows the error: short elements where the fields change fast, long ones where nothing happens.
+
+use super::accuracy::Estimate;
+use super::active_set::settle;
+use super::search::{Search, prolong};
+use crate::problem::program::{BeltPoint, BeltProgram};
+use crate::problem::{Mesh, Problem};
+use crate::scenario::SAME_PLACE;
+use crate::strip::element::Element;
+use stagewise::{Outcome, Solution};
+use std::ops::ControlFlow;
+
+/// Elements of the first mesh, a number.
+const FIRST: usize = 40;
+/// Length of the longest elements of a mesh that is fine enough, in U: so short that it also suits shapes nearby.
+const LONGEST: f64 = 0.0125;
+/// Greatest number of elements of a mesh.
+const MOST: usize = 20_000;
+/// Greatest number of meshes.
+const MESHES: usize = 12;
+/// Greatest number of meshes that carry no equilibrium.
+const FAILURES: usize = 3;
+/// Turn of an element beyond which its equations are no longer those of a belt, in rad.
+const MOST_TURN: f64 = 0.5;
+/// Error beyond which an estimate tells no more than that the error is large, dimensionless.
+const LARGE: f64 = 0.05;
+/// Elements for each width V where ribs turn, a number: longer ones may settle on a false level.
+const PER_WIDTH: f64 = 8.0;
+
+/// A solution on a mesh.
+pub(super) struct Level {
+    pub(super) program: BeltProgram,
+    pub(super) solution: Solution<BeltPoint>,
+    /// The fault of its active sets.
+    misfit: Option<String>,
+    /// `None` of a solution that is not sound, or has no solution of a finer mesh next to it.
+    pub(super) estimate: Option<Estimate>,
+}
+
+/// Finds a minimum on meshes graded to the estimated error, until the error is as small as the problem asks: from a shape of
+/// a programme, on its mesh first; without one from the guess. If no mesh carries the accuracy, the best result of all.
+pub(super) fn refine(
+    problem: &Problem,
+    search: &Search,
+    start: Option<(&BeltProgram, &BeltPoint)>,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Level {
+    let mut best = match start {
+        Some(_) => None,
+        None => narrowed(problem, search, proceed),
+    };
+    let mut mesh = match (&best, start) {
+        (Some(level), _) => level.mesh_for_ribs(problem, 1.0),
+        (None, Some((program, _))) => Mesh::of(problem, program),
+        (None, None) => first_mesh(problem),
+    };
+    let mut iterations = best.as_ref().map_or(0, |level| level.solution.iterations);
+    let mut failures = 0;
+    for _ in 0..MESHES {
+        let Some(program) = problem.program_on(&mesh) else {
+            break;
+        };
+        let sound = best.as_ref().filter(|best| best.is_sound());
+        let near = sound.map(|best| (&best.program, &best.solution.at.point));
+        let mut level = Level::on(problem, search, program, near.or(start), proceed);
+        level.estimate(problem);
+        iterations += level.solution.iterations;
+        level.solution.iterations = iterations;
+        if level.solution.outcome == Outcome::Interrupted || level.is_accurate(problem.accuracy()) {
+            return level;
+        }
+        failures += usize::from(!level.is_sound());
+        mesh = level.better_mesh(problem);
+        best = match best {
+            Some(best) if best.estimate.is_some() && !level.is_better_than(&best) => Some(best),
+            _ => Some(level),
+        };
+        if failures > FAILURES || mesh.elements() > MOST {
+            break;
+        }
+    }
+    let mut best = best.expect("the first mesh has a programme");
+    best.solution.iterations = iterations;
+    best
+}
+
+/// The minimum of a wider belt made narrower step by step, down to little wider than the belt; `None` of a belt that is not
+/// slender, or where this leads nowhere.
+///
+/// The ribs of a slender belt turn within a length of its width, at places that no mesh can know before. Those of a wider
+/// belt turn at nearly the same places, and less suddenly.
+fn narrowed(
+    problem: &Problem,
+    search: &Search,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Option<Level> {
+    /// Factor by which the belt is made narrower from one mesh to the next, dimensionless.
+    const NARROWER: f64 = 8.0;
+    /// Residual of a minimum that is only a start, lengths in U and energy in mean R_f/U.
+    const ROUGH: f64 = 1e-4;
+    let search = Search {
+        tolerance: search.tolerance.max(ROUGH),
+        ..*search
+    };
+    let mut width = first_width(problem);
+    let mut mesh = first_mesh(problem);
+    let mut best: Option<Level> = None;
+    let mut iterations = 0;
+    while width > 1.0 {
+        let program = problem.program_on(&mesh)?.widened(width);
+        let near = best.as_ref();
+        let near = near.map(|level| (&level.program, &level.solution.at.point));
+        let mut level = Level::on(problem, &search, program, near, proceed);
+        iterations += level.solution.iterations;
+        level.solution.iterations = iterations;
+        if !level.is_sound() {
+            return None;
+        }
+        width = (width / NARROWER).max(1.0);
+        mesh = level.mesh_for_ribs(problem, width);
+        best = Some(level);
+    }
+    best
+}
+
+/// Elements of equal length, but shorter beside supports, links and loads: a tension T bends a belt there within √(R_f/T).
+fn first_mesh(problem: &Problem) -> Mesh {
+    /// Length of an element in such a layer over the length √(R_f/T), with the sum of all loads for the tension.
+    const SHARE: f64 = 0.5;
+    let program = problem.program(FIRST);
+    let forces = program.loads.iter().map(|load| load.load.force.norm());
+    let tension = program.weight.norm() + forces.sum::<f64>();
+    let breaks = problem.break_points();
+    let nodes = program.nodes();
+    let is_break = |node: f64| breaks.iter().any(|at| (node - at).abs() < SAME_PLACE);
+    let lengths: Vec<f64> = program
+        .elements()
+        .map(
+            |(k, element)| match is_break(nodes[k]) || is_break(nodes[k + 1]) {
+                true => element.length.min(SHARE / tension.sqrt()),
+                false => element.length,
+            },
+        )
+        .collect();
+    Mesh::uniform(problem, FIRST).graded(problem, &lengths)
+}
+
+/// Width of the belt that is solved first, over the belt's own; 1 of a belt that is not slender.
+fn first_width(problem: &Problem) -> f64 {
+    /// Width of a belt that is not slender, in U.
+    const WIDE: f64 = 0.05;
+    /// Greatest width over the length of a stretch, and over the radius of an arc, dimensionless.
+    const SHARE: f64 = 0.5;
+    let breaks = problem.break_points();
+    let stretches = breaks.windows(2).map(|ends| ends[1] - ends[0]);
+    let shortest = stretches.fold(f64::INFINITY, f64::min);
+    let program = problem.program(FIRST);
+    let radii = program.elements().map(|(_, e)| e.geodesic.abs().recip());
+    let least = radii.fold(shortest, f64::min);
+    (WIDE.min(SHARE * least) / width(problem)).max(1.0)
+}
+
+/// The width of a belt, in U.
+fn width(problem: &Problem) -> f64 {
+    problem.belt().width / problem.units().length
+}
+
+impl Level {
+    /// The minimum on a mesh, from a shape of another programme or from the guess; without an estimate.
+    fn on(
+        problem: &Problem,
+        search: &Search,
+        mut program: BeltProgram,
+        near: Option<(&BeltProgram, &BeltPoint)>,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Self {
+        let solution = match near {
+            None => search.run(&program, None, proceed),
+            Some((known, shape)) => {
+                let shape = prolong(known, shape, &program);
+                search.only_from(&program, shape, search.settings.warm_barrier, proceed)
+            }
+        };
+        let (solution, misfit) = settle(problem, search, &mut program, solution, proceed);
+        Self::new(program, solution, misfit)
+    }
+
+    /// A solution of a programme, with the fault of its active sets, if they have one.
+    pub(super) fn new(
+        program: BeltProgram,
+        solution: Solution<BeltPoint>,
+        misfit: Option<String>,
+    ) -> Self {
+        Self {
+            estimate: None,
+            program,
+            solution,
+            misfit,
+        }
+    }
+
+    /// Estimates the error of a solution that has converged.
+    pub(super) fn estimate(&mut self, problem: &Problem) {
+        if self.has_converged() {
+            let (at, values) = (&self.solution.at, &self.solution.values);
+            self.estimate = Estimate::new(problem, &self.program, at, values);
+        }
+    }
+
+    /// Why the solution cannot be relied on, though it has converged; `None` where it can.
+    pub(super) fn fault(&self) -> Option<String> {
+        let turned = (self.turns_too_far() && !self.is_confirmed()).then(|| {
+            format!(
+                "elements turn by up to {:.1} rad, too far for the equations of a belt, and no finer mesh confirms the shape; \
+                 leave out solver.elements, move the supports apart, or lower the loads",
+                self.turn()
+            )
+        });
+        self.misfit.clone().or(turned)
+    }
+
+    fn has_converged(&self) -> bool {
+        self.solution.outcome == Outcome::Converged && self.misfit.is_none()
+    }
+
+    /// Whether an element turns so far that its equations are no longer those of a belt.
+    pub(super) fn turns_too_far(&self) -> bool {
+        self.turn() > MOST_TURN
+    }
+
+    /// Whether a finer mesh has much the same solution.
+    fn is_confirmed(&self) -> bool {
+        let estimate = self.estimate.as_ref();
+        estimate.is_some_and(|estimate| estimate.error.largest() <= LARGE)
+    }
+
+    /// Whether the solution is an equilibrium of a belt.
+    fn is_sound(&self) -> bool {
+        self.has_converged() && (!self.turns_too_far() || self.is_confirmed())
+    }
+
+    fn is_accurate(&self, accuracy: f64) -> bool {
+        let estimate = self.estimate.as_ref();
+        let lengths = self.program.elements().map(|(_, element)| element.length);
+        let longest = lengths.fold(0.0, f64::max);
+        !self.turns_too_far()
+            && longest <= LONGEST + SAME_PLACE
+            && estimate.is_some_and(|e| e.error.largest() <= accuracy)
+    }
+
+    /// Whether the level tells more of the belt than another.
+    fn is_better_than(&self, other: &Self) -> bool {
+        let rank = |level: &Self| match level.solution.outcome {
+            Outcome::Converged if level.is_sound() => 2,
+            Outcome::Converged => 1,
+            _ => 0,
+        };
+        let error = |level: &Self| match &level.estimate {
+            Some(estimate) => estimate.error.largest(),
+            None => f64::INFINITY,
+        };
+        (rank(self), -error(self)) >= (rank(other), -error(other))
+    }
+
+    /// The largest angle by which an element turns.
+    fn turn(&self) -> f64 {
+        let elements = self.program.elements();
+        let turns = elements.map(|element| self.turn_of(element));
+        turns.fold(0.0, f64::max)
+    }
+
+    /// Angle by which an element turns if it turns as fast all along as at its tighter end.
+    fn turn_of(&self, (k, element): (usize, &Element)) -> f64 {
+        let rate = |node: usize| {
+            let [bend, slope] = self.solution.at.point.fields[node].into();
+            bend.hypot(slope * bend).hypot(element.geodesic)
+        };
+        element.length * rate(k).max(rate(k + 1))
+    }
+
+    /// Whether the ribs turn fast in an element, as seen by its width.
+    fn ribs_turn(&self, (k, element): (usize, &Element)) -> bool {
+        /// Share of the greatest convergence 2/V from which ribs turn fast, dimensionless.
+        const FAST: f64 = 0.2;
+        let fields = &self.solution.at.point.fields;
+        let (_, convergence) = element.strips().middle([fields[k][1], fields[k + 1][1]]);
+        convergence.abs() * element.half_width > FAST
+    }
+
+    /// A mesh for the ribs of the belt at another width, over its own.
+    fn mesh_for_ribs(&self, problem: &Problem, times: f64) -> Mesh {
+        let short = times * width(problem) / PER_WIDTH;
+        let elements = self.program.elements();
+        let lengths: Vec<f64> = elements
+            .map(|(k, element)| match self.ribs_turn((k, element)) {
+                true => element.length.min(short),
+                false => element.length.max(LONGEST),
+            })
+            .collect();
+        Mesh::of(problem, &self.program).graded(problem, &lengths)
+    }
+
+    /// A mesh on which the error should be within the accuracy. A belt that may slide along itself has no place on a graded
+    /// mesh: there the elements are halved.
+    fn better_mesh(&self, problem: &Problem) -> Mesh {
+        let mesh = Mesh::of(problem, &self.program);
+        match &self.estimate {
+            Some(estimate) if self.is_sound() && !problem.is_left_alone() => {
+                mesh.graded(problem, &self.lengths(estimate, problem.accuracy()))
+            }
+            _ => mesh.halved(),
+        }
+    }
+
+    /// Lengths of elements for an accuracy, one an element.
+    fn lengths(&self, estimate: &Estimate, accuracy: f64) -> Vec<f64> {
+        /// Power of an element's length with which its gain falls, a number.
+        const POWER: f64 = 3.0;
+        /// Bounds of the change of a length from one mesh to the next, dimensionless.
+        const CHANGE: [f64; 2] = [0.03, 2.0];
+        /// Turn of an element that is aimed at, in rad.
+        const TURN: f64 = 0.3;
+        /// Share of the accuracy that is aimed at, dimensionless.
+        const AIM: f64 = 0.5;
+        /// Share of the largest curvature from which an element may have the tightest bend, dimensionless.
+        const TIGHT: f64 = 0.95;
+        let total: f64 = estimate.gains.iter().sum();
+        let roots = estimate.gains.iter().map(|gain| gain.powf(1.0 / POWER));
+        let error = estimate.error.of_the_whole().clamp(accuracy, LARGE);
+        let goal = AIM * total * accuracy / error;
+        let each = (goal / roots.sum::<f64>()).powf(POWER / (POWER - 1.0));
+        let curvatures = estimate.curvatures.iter();
+        let tightest = curvatures.map(|[most, _]| *most).fold(0.0, f64::max);
+        let elements = self.program.elements().zip(&estimate.gains);
+        let lengths = elements.zip(&estimate.curvatures);
+        let lengths: Vec<f64> = lengths
+            .map(|(((k, element), gain), [curvature, change])| {
+                let by_gain = (each / gain).powf(1.0 / POWER);
+                let by_turn = TURN / self.turn_of((k, element));
+                let by_radius = match *curvature > TIGHT * tightest {
+                    true => (AIM * accuracy * tightest / change).sqrt(),
+                    false => f64::INFINITY,
+                };
+                let by_ribs = match self.ribs_turn((k, element)) {
+                    true => 2.0 * element.half_width / (PER_WIDTH * element.length),
+                    false => f64::INFINITY,
+                };
+                let factor = by_gain.min(by_turn).min(by_radius).min(by_ribs);
+                (element.length * factor.clamp(CHANGE[0], CHANGE[1])).min(LONGEST)
+            })
+            .collect();
+        self.not_too_many(lengths)
+    }
+
+    /// Lengths made so much longer that a mesh of them has no more than some times as many elements as this one.
+    fn not_too_many(&self, mut lengths: Vec<f64>) -> Vec<f64> {
+        /// Greatest number of elements over the number of the mesh before, dimensionless.
+        const MORE: f64 = 4.0;
+        let elements = self.program.elements().map(|(_, element)| element.length);
+        let count: f64 = elements.zip(&lengths).map(|(own, new)| own / new).sum();
+        let excess = count / (MORE * lengths.len() as f64);
+        if excess > 1.0 {
+            for length in &mut lengths {
+                *length *= excess;
+            }
+        }
+        lengths
+    }
+}

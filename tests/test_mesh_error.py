@@ -1,0 +1,171 @@
+"""The mesh follows the error: estimates are honest, layers and slender belts are resolved."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import fishbone as fb
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+CLAMP = [0.0, 0.0, 0.0]
+
+
+def scenario(
+    supports: list[dict[str, Any]], *, width: float = 0.1, energy: str = "wunderlich", **tables: Any
+) -> dict[str, Any]:
+    belt = {"width": width, "rigidity": 1.0, "segments": [{"kind": "straight", "length": 1.0}]} | tables.pop("belt", {})
+    return {"energy": energy, "belt": belt, "supports": supports} | tables
+
+
+def clamps(position: list[float], rotation: list[float]) -> list[dict[str, Any]]:
+    return [
+        {"at": "start", "position": CLAMP, "rotation": CLAMP},
+        {"at": "end", "position": position, "rotation": rotation},
+    ]
+
+
+def pins(distance: float) -> list[dict[str, Any]]:
+    return [{"at": "start", "position": CLAMP}, {"at": "end", "position": [0.0, distance, 0.0]}]
+
+
+def solve(tables: dict[str, Any], **solver: Any) -> fb.Equilibrium:
+    return fb.solve(fb.Scenario.from_dict(tables | {"solver": tables.get("solver", {}) | solver}), strict=True)
+
+
+def quarter_twist(slenderness: float) -> dict[str, Any]:
+    return scenario(clamps([0.1, 0.8, 0.0], [0.0, math.pi / 2, 0.0]), width=1.0 / slenderness)
+
+
+def curved_twist() -> dict[str, Any]:
+    segments = [{"kind": "straight", "length": 0.6}, {"kind": "arc", "length": 0.4, "curvature": 1.4}]
+    return scenario(clamps([0.1, 0.6, 0.3], [0.3, 0.4, 0.0]), belt={"segments": segments})
+
+
+CASES: dict[str, Callable[[], dict[str, Any]]] = {
+    "example 1": lambda: scenario(clamps([0.0, 0.5, 0.1], CLAMP)),
+    "example 1, fishbone": lambda: scenario(clamps([0.0, 0.5, 0.1], CLAMP), energy="fishbone"),
+    "example 2": lambda: scenario(clamps([0.0, 0.7, 0.0], [0.0, math.pi / 6, 0.0])),
+    "planar": lambda: scenario(clamps([0.0, 0.6, 0.0], CLAMP)),
+    "curved": curved_twist,
+}
+
+
+MOST = {"example 1, fishbone": 80}
+"""Its force has the same error on 80 and on 160 elements, by ribs at the bound: no halving tells that."""
+
+
+def off(coarse: fb.Equilibrium, fine: fb.Equilibrium) -> list[float]:
+    """The true errors, by a much finer mesh: energy, position, force, radius."""
+    bend = [np.abs(belt.curvature).max() for belt in (coarse, fine)]
+    force = [
+        np.concatenate([np.concatenate(belt.reaction(end)) for end in ("start", "end")]) for belt in (coarse, fine)
+    ]
+    # The largest norm of a force or moment counts in the estimate; by components this is the same but for a factor.
+    largest = np.linalg.norm(force[1].reshape(-1, 3), axis=1).max()
+    shared = [np.abs(fine.u - u).argmin() for u in coarse.u]
+    moved = np.linalg.norm(coarse.position - fine.position[shared], axis=1)
+    return [
+        abs(coarse.energy / fine.energy - 1.0),
+        float(moved.max()),
+        float(np.linalg.norm((force[0] - force[1]).reshape(-1, 3), axis=1).max() / largest),
+        abs(bend[0] / bend[1] - 1.0),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("name", "elements"),
+    [(name, elements) for name in CASES for elements in (40, 80) if elements < MOST.get(name, 100)],
+)
+def test_estimated_errors_are_honest(name: str, elements: int) -> None:
+    tables = CASES[name]()
+    coarse, fine = (solve(tables, elements=count, tolerance=1e-9) for count in (elements, 16 * elements))
+    estimate = coarse.error
+    assert estimate is not None
+    for quantity, estimated, true in zip(estimate._fields[:3], estimate[:3], off(coarse, fine)[:3], strict=True):
+        assert 0.3 * true <= estimated <= 10.0 * true + 1e-9, (quantity, estimated, true)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_default_mesh_is_as_accurate_as_it_says(name: str) -> None:
+    tables = CASES[name]()
+    found, fine = solve(tables), solve(tables, elements=1280)
+    assert found.error is not None
+    assert max(found.error) <= 1e-3
+    assert not found.warnings
+    assert found.energy == pytest.approx(fine.energy, rel=1e-3)
+    force = np.concatenate(fine.reaction("end"))
+    np.testing.assert_allclose(np.concatenate(found.reaction("end")), force, atol=2e-3 * np.abs(force).max())
+
+
+def test_accuracy_is_bought_with_elements() -> None:
+    tables = CASES["example 2"]()
+    counts = [solve(tables, accuracy=accuracy).u.size for accuracy in (1e-2, 1e-3, 1e-4)]
+    assert counts[0] < counts[1] < counts[2]
+
+
+def test_coarse_fixed_mesh_is_warned_of() -> None:
+    [warning] = solve(CASES["example 2"](), elements=80).warnings
+    assert "force" in warning
+    assert "solver.accuracy, 0.001" in warning
+
+
+def test_tape_under_its_own_weight_hangs_as_a_catenary() -> None:
+    """A polyimide tape of 25 µm pinned 1 mm short of its length; horizontal force by the catenary's parameter a."""
+    length, chord = 1.0, 0.999
+    half = brentq(lambda x: np.sinh(x) / x - length / chord, 1e-3, 1.0)
+    a = chord / 2.0 / half
+    material = {"preset": "polyimide", "thickness": 25e-6}
+    belt = {"width": 0.1, "material": material, "segments": [{"kind": "straight", "length": length}]}
+    tables = {
+        "energy": "wunderlich",
+        "belt": belt,
+        "supports": pins(chord),
+        "loads": {"gravity": [-9.81, 0.0, 0.0]},
+        "solver": {"bulge": [-1.0, 0.0, 0.0]},
+    }
+    found = solve(tables)
+    weight = -found.reaction("start").force[0] * 2.0
+    assert -found.position[:, 0].min() == pytest.approx(a * (np.cosh(half) - 1.0), rel=1e-3)
+    assert found.reaction("end").force[1] == pytest.approx(abs(weight) / length * a, rel=1e-3)
+    assert found.stable is True
+
+
+@pytest.mark.parametrize("lean", [0.3, math.pi / 3, 2.0])
+@pytest.mark.parametrize("pull", [1e3, 1e5])
+def test_leaning_clamp_under_tension_bends_as_the_elastica(lean: float, pull: float) -> None:
+    """R = √(R_f/F) / (2 sin(φ/2)): the first integral of the elastica that is straight along the pull far away."""
+    supports = [{"at": "start", "position": CLAMP, "rotation": [0.0, 0.0, -lean]}]
+    tables = scenario(supports, loads={"points": [{"at": "end", "force": [0.0, pull, 0.0]}]})
+    found = solve(tables)
+    assert found.bend_radius.spine is not None
+    radius = math.sqrt(1.0 / pull) / (2.0 * math.sin(lean / 2.0))
+    assert found.bend_radius.spine.value == pytest.approx(radius, rel=2e-3)
+    assert found.error is not None
+    assert max(found.error) <= 1e-3
+
+
+def test_slender_belts_tend_to_a_limit() -> None:
+    energies = []
+    for slenderness in (100.0, 300.0, 1000.0, 3000.0):
+        found = solve(quarter_twist(slenderness))
+        assert found.iterations < 1000
+        assert found.error is not None
+        assert max(found.error) <= 1e-3
+        energies.append(found.energy)
+    falls = -np.diff(energies)
+    assert np.all(falls > 0.0)
+    assert np.all(falls[1:] < 0.6 * falls[:-1])
+
+
+def test_ends_drawn_past_each_other_are_carried_or_refused() -> None:
+    for distance in (-0.9, -0.95):
+        found = fb.solve(fb.Scenario.from_dict(scenario(clamps([0.0, distance, 0.0], CLAMP))))
+        turns = np.einsum("kij,kij->k", found.frame[:-1], found.frame[1:])
+        assert found.status != "converged" or np.arccos(0.5 * (turns.min() - 1.0)) <= 0.5
