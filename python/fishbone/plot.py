@@ -218,7 +218,10 @@ def _draw(equilibrium: Equilibrium) -> Figure:
     heights = [views_height, _flat_height(equilibrium) + _DECORATION, _GRAPHS, _KEY]
     figure = Figure(figsize=(_WIDTH, sum(heights)), layout="constrained")
     figure.suptitle(_title(equilibrium), fontsize=10.0, parse_math=False)
-    upper, middle, lower, key = figure.subfigures(4, 1, height_ratios=heights, squeeze=False).flat
+    parts = figure.subfigures(4, 1, height_ratios=heights, squeeze=False).ravel()
+    for part in parts:
+        part.patch.set_visible(False)  # its lower edge would be at 0 or at −0, as the arrays are in memory
+    upper, middle, lower, key = parts
     _draw_views(upper, scene)
     draw_flat(middle.subplots(), equilibrium)
     _draw_graphs(lower, equilibrium)

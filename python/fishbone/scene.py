@@ -54,7 +54,9 @@ class View(NamedTuple):
 
     def page(self, points: ArrayLike) -> Floats:
         """World points on the page."""
-        return np.asarray(points) @ np.stack((self.right, self.up), axis=-1)
+        # No matrix product: its last digit depends on where the arrays are in memory, and so would the file.
+        axes = np.stack((self.right, self.up), axis=-1)
+        return np.sum(np.asarray(points)[..., np.newaxis] * axes, axis=-2)
 
 
 UNIT = np.eye(3)
@@ -143,7 +145,7 @@ def _draw_strips(axes: Axes, strips: list[Strip], view: View, *, lit: bool) -> N
     strokes: list[str] = []
     widths: list[float] = []
     # The painter's algorithm: near strips hide far strips.
-    for strip in sorted(strips, key=lambda strip: float(strip.middle @ view.toward)):
+    for strip in sorted(strips, key=lambda strip: float(np.sum(strip.middle * view.toward))):
         for face in strip.faces:
             shade = str(_shade(face, view, rigid=strip.rigid, lit=lit))
             paths.append(Path(view.page(face), closed=False))
@@ -163,9 +165,9 @@ def _draw_strips(axes: Axes, strips: list[Strip], view: View, *, lit: bool) -> N
 def _shade(face: Floats, view: View, *, rigid: bool, lit: bool) -> float:
     normal = np.cross(face[1] - face[0], face[2] - face[0])
     normal /= max(float(np.linalg.norm(normal)), np.finfo(float).tiny)
-    shade = LIGHT if normal @ view.toward > 0.0 else DARK
+    shade = LIGHT if np.sum(normal * view.toward) > 0.0 else DARK
     if lit:
-        shade -= 0.22 * (1.0 - abs(float(normal @ _LAMP)))
+        shade -= 0.22 * (1.0 - abs(float(np.sum(normal * _LAMP))))
     return shade - RIGID * rigid
 
 

@@ -2,12 +2,12 @@
 
 use super::accuracy::Estimate;
 use super::active_set::settle;
-use super::search::{Search, prolong};
+use super::search::{Search, prolong, prolonged};
 use crate::problem::program::{BeltPoint, BeltProgram};
 use crate::problem::{Mesh, Problem};
 use crate::scenario::SAME_PLACE;
 use crate::strip::element::Element;
-use stagewise::{Outcome, Solution};
+use stagewise::{Distance, Outcome, Solution};
 use std::ops::ControlFlow;
 
 /// Elements of the first mesh, a number.
@@ -45,14 +45,9 @@ pub(super) fn refine(
     start: Option<(&BeltProgram, &BeltPoint)>,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Level {
-    let mut best = match start {
-        Some(_) => None,
-        None => narrowed(problem, search, proceed),
-    };
-    let mut mesh = match (&best, start) {
-        (Some(level), _) => level.mesh_for_ribs(problem, 1.0),
-        (None, Some((program, _))) => Mesh::of(problem, program),
-        (None, None) => first_mesh(problem),
+    let (mut best, mut mesh) = match start {
+        Some((program, _)) => (None, Mesh::of(problem, program)),
+        None => first_level(problem, search, proceed),
     };
     let mut iterations = best.as_ref().map_or(0, |level| level.solution.iterations);
     let mut failures = 0;
@@ -61,8 +56,13 @@ pub(super) fn refine(
             break;
         };
         let sound = best.as_ref().filter(|best| best.is_sound());
-        let near = sound.map(|best| (&best.program, &best.solution.at.point));
-        let mut level = Level::on(problem, search, program, near.or(start), proceed);
+        let mut level = match sound {
+            Some(best) => best.on_finer(problem, search, program, proceed),
+            None => {
+                let barrier = search.settings.cold_barrier;
+                Level::on(problem, search, program, start, barrier, proceed)
+            }
+        };
         level.estimate(problem);
         iterations += level.solution.iterations;
         level.solution.iterations = iterations;
@@ -84,6 +84,57 @@ pub(super) fn refine(
     best
 }
 
+/// The minimum of an easier problem and the mesh for the problem itself; without an easier one, its first mesh alone.
+fn first_level(
+    problem: &Problem,
+    search: &Search,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> (Option<Level>, Mesh) {
+    /// Residual of a minimum that is only a start, lengths in U and energy in mean R_f/U.
+    const ROUGH: f64 = 1e-4;
+    let rough = Search {
+        tolerance: search.tolerance.max(ROUGH),
+        ..*search
+    };
+    let mesh = first_mesh(problem);
+    if let Some(level) = loaded(problem, &rough, &mesh, proceed) {
+        return (Some(level), mesh);
+    }
+    match narrowed(problem, &rough, mesh.clone(), proceed) {
+        Some(level) => {
+            let mesh = level.mesh_for_ribs(problem, 1.0);
+            (Some(level), mesh)
+        }
+        None => (None, mesh),
+    }
+}
+
+/// The minimum under loads raised step by step, up to little less than all; `None` of loads that a belt stands at once, or
+/// where this leads nowhere.
+///
+/// Under loads far beyond its stiffness a belt may crumple anywhere. The shape that it takes as loads are raised is smooth.
+fn loaded(
+    problem: &Problem,
+    search: &Search,
+    mesh: &Mesh,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Option<Level> {
+    /// Sum of loads that a belt stands at once, in mean R_f/U².
+    const LIGHT: f64 = 1e5;
+    /// Factor by which the loads are raised, dimensionless.
+    const HEAVIER: f64 = 4.0;
+    let program = problem.program_on(mesh)?;
+    let mut share = LIGHT / program.total_load();
+    let mut best: Option<Level> = None;
+    while share < 1.0 {
+        let eased = program.clone().under_share_of_loads(share);
+        let level = Level::after(best, problem, search, eased, proceed)?;
+        share *= HEAVIER;
+        best = Some(level);
+    }
+    best
+}
+
 /// The minimum of a wider belt made narrower step by step, down to little wider than the belt; `None` of a belt that is not
 /// slender, or where this leads nowhere.
 ///
@@ -92,30 +143,16 @@ pub(super) fn refine(
 fn narrowed(
     problem: &Problem,
     search: &Search,
+    mut mesh: Mesh,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Option<Level> {
     /// Factor by which the belt is made narrower from one mesh to the next, dimensionless.
     const NARROWER: f64 = 8.0;
-    /// Residual of a minimum that is only a start, lengths in U and energy in mean R_f/U.
-    const ROUGH: f64 = 1e-4;
-    let search = Search {
-        tolerance: search.tolerance.max(ROUGH),
-        ..*search
-    };
     let mut width = first_width(problem);
-    let mut mesh = first_mesh(problem);
     let mut best: Option<Level> = None;
-    let mut iterations = 0;
     while width > 1.0 {
         let program = problem.program_on(&mesh)?.widened(width);
-        let near = best.as_ref();
-        let near = near.map(|level| (&level.program, &level.solution.at.point));
-        let mut level = Level::on(problem, &search, program, near, proceed);
-        iterations += level.solution.iterations;
-        level.solution.iterations = iterations;
-        if !level.is_sound() {
-            return None;
-        }
+        let level = Level::after(best, problem, search, program, proceed)?;
         width = (width / NARROWER).max(1.0);
         mesh = level.mesh_for_ribs(problem, width);
         best = Some(level);
@@ -128,8 +165,7 @@ fn first_mesh(problem: &Problem) -> Mesh {
     /// Length of an element in such a layer over the length √(R_f/T), with the sum of all loads for the tension.
     const SHARE: f64 = 0.5;
     let program = problem.program(FIRST);
-    let forces = program.loads.iter().map(|load| load.load.force.norm());
-    let tension = program.weight.norm() + forces.sum::<f64>();
+    let tension = program.total_load();
     let breaks = problem.break_points();
     let nodes = program.nodes();
     let is_break = |node: f64| breaks.iter().any(|at| (node - at).abs() < SAME_PLACE);
@@ -166,23 +202,72 @@ fn width(problem: &Problem) -> f64 {
 }
 
 impl Level {
-    /// The minimum on a mesh, from a shape of another programme or from the guess; without an estimate.
+    /// The same minimum on a finer mesh: if the search leaves it, again from the same shape with a lower barrier.
+    fn on_finer(
+        &self,
+        problem: &Problem,
+        search: &Search,
+        program: BeltProgram,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Self {
+        /// Displacement of a node beyond which a minimum is another one, in U.
+        const ANOTHER: f64 = 0.05;
+        let own = (&self.program, &self.solution.at.point);
+        let with = |barrier, proceed: &mut dyn FnMut() -> ControlFlow<()>| {
+            Self::on(
+                problem,
+                search,
+                program.clone(),
+                Some(own),
+                barrier,
+                proceed,
+            )
+        };
+        let level = with(search.settings.warm_barrier, proceed);
+        let here = prolonged(own.0, own.1, &level.program);
+        if level.solution.at.point.distance(&here) <= ANOTHER {
+            return level;
+        }
+        let mut again = with(search.settings.close_barrier, proceed);
+        again.solution.iterations += level.solution.iterations;
+        if again.has_converged() { again } else { level }
+    }
+
+    /// The minimum on a mesh, from a shape of another programme with a first barrier, or from the guess; without an
+    /// estimate.
     fn on(
         problem: &Problem,
         search: &Search,
         mut program: BeltProgram,
         near: Option<(&BeltProgram, &BeltPoint)>,
+        barrier: f64,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Self {
         let solution = match near {
             None => search.run(&program, None, proceed),
             Some((known, shape)) => {
                 let shape = prolong(known, shape, &program);
-                search.only_from(&program, shape, search.settings.warm_barrier, proceed)
+                search.only_from(&program, shape, barrier, proceed)
             }
         };
         let (solution, misfit) = settle(problem, search, &mut program, solution, proceed);
         Self::new(program, solution, misfit)
+    }
+
+    /// The minimum that goes on from another level's, with the iterations of both; `None` if it is not sound.
+    fn after(
+        before: Option<Self>,
+        problem: &Problem,
+        search: &Search,
+        program: BeltProgram,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Option<Self> {
+        let near = before.as_ref();
+        let near = near.map(|level| (&level.program, &level.solution.at.point));
+        let barrier = search.settings.warm_barrier;
+        let mut level = Self::on(problem, search, program, near, barrier, proceed);
+        level.solution.iterations += before.map_or(0, |level| level.solution.iterations);
+        level.is_sound().then_some(level)
     }
 
     /// A solution of a programme, with the fault of its active sets, if they have one.
@@ -324,6 +409,10 @@ impl Level {
         const AIM: f64 = 0.5;
         /// Share of the largest curvature from which an element may have the tightest bend, dimensionless.
         const TIGHT: f64 = 0.95;
+        if estimate.error.largest() <= accuracy {
+            let elements = self.program.elements();
+            return elements.map(|(_, e)| e.length.min(LONGEST)).collect();
+        }
         let total: f64 = estimate.gains.iter().sum();
         let roots = estimate.gains.iter().map(|gain| gain.powf(1.0 / POWER));
         let error = estimate.error.of_the_whole().clamp(accuracy, LARGE);

@@ -149,6 +149,21 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         self
     }
 
+    /// The programme under a share of its weight and loads.
+    pub(crate) fn under_share_of_loads(mut self, share: f64) -> Self {
+        self.weight *= share;
+        for load in &mut self.loads {
+            load.load.force *= share;
+        }
+        self
+    }
+
+    /// Sum of the sizes of weight and loads, in mean R_f/U².
+    pub(crate) fn total_load(&self) -> f64 {
+        let forces = self.loads.iter().map(|load| load.load.force.norm());
+        self.weight.norm() + forces.sum::<f64>()
+    }
+
     /// Fields that a stiffened stretch prescribes at a node: no bend inside, square ribs at its ends too.
     fn fixed_by_pieces(&self, node: usize) -> [Option<f64>; F] {
         let beside = [node.checked_sub(1), Some(node)];
