@@ -56,7 +56,8 @@ class View(NamedTuple):
         """World points on the page."""
         # No matrix product: its last digit depends on where the arrays are in memory, and so would the file.
         axes = np.stack((self.right, self.up), axis=-1)
-        return np.sum(np.asarray(points)[..., np.newaxis] * axes, axis=-2)
+        page: Floats = np.sum(np.asarray(points)[..., np.newaxis] * axes, axis=-2)
+        return page
 
 
 UNIT = np.eye(3)
