@@ -39,7 +39,7 @@ pub use program::{Distance, Multipliers, Program, Scales, Stationary, Values};
 
 /// The larger of two numbers; NaN where either number is NaN, so that no NaN is lost.
 fn larger(a: f64, b: f64) -> f64 {
-    if b <= a { a } else { b }
+    if a >= b || a.is_nan() { a } else { b }
 }
 
 /// Largest absolute value; NaN where a number is NaN.

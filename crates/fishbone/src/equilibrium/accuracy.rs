@@ -49,6 +49,12 @@ impl MeshError {
         self.energy.max(self.position).max(self.force)
     }
 
+    /// Whether all errors are numbers, but for the position of a belt that may slide.
+    fn is_known(&self, may_slide: bool) -> bool {
+        let known = [self.energy, self.force, self.radius];
+        known.iter().all(|error| error.is_finite()) && (may_slide || self.position.is_finite())
+    }
+
     fn times(&self, factor: f64) -> Self {
         Self {
             energy: factor * self.energy,
@@ -131,7 +137,7 @@ impl Estimate {
             let change = curvatures.iter().map(|[better, own]| (better - own).abs());
             [most.fold(0.0, f64::max), change.fold(0.0, f64::max)]
         };
-        error.of_the_whole().is_finite().then(|| Self {
+        error.is_known(own.may_slide).then(|| Self {
             error: error.times(OVER_CHANGE),
             gains: middles
                 .clone()
@@ -224,10 +230,10 @@ impl Quantities {
             energy: share(self.energy - better.energy, energies[0].max(energies[1])),
             position: match self.may_slide {
                 true => f64::NAN,
-                false => moves.fold(0.0, f64::max) / self.spine.length(),
+                false => moves.fold(0.0, larger) / self.spine.length(),
             },
             force: share(
-                changes.fold(0.0, f64::max),
+                changes.fold(0.0, larger),
                 largest(&better.forces).max(largest(&better.internal)),
             ),
             radius: share(self.curvature - better.curvature, better.curvature),
@@ -239,8 +245,39 @@ impl Quantities {
 fn share(change: f64, whole: f64) -> f64 {
     /// A whole that is nothing but rounding, in mean R_f/U and U.
     const NOTHING: f64 = 1e-7;
-    match whole > NOTHING {
-        true => (change / whole).abs(),
-        false => 0.0,
+    match whole <= NOTHING {
+        true => 0.0,
+        false => (change / whole).abs(),
+    }
+}
+
+/// The larger of two numbers; NaN where either is NaN, so that no NaN is lost.
+fn larger(a: f64, b: f64) -> f64 {
+    if a >= b || a.is_nan() { a } else { b }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn test_number_that_is_none_is_no_small_error() {
+        let small = MeshError {
+            energy: 1e-6,
+            position: 1e-6,
+            force: 1e-6,
+            radius: 1e-6,
+        };
+        assert!(small.is_known(false));
+        let slides = MeshError {
+            position: f64::NAN,
+            ..small
+        };
+        assert!(slides.is_known(true) && !slides.is_known(false));
+        for energy in [f64::NAN, f64::INFINITY] {
+            assert!(!MeshError { energy, ..small }.is_known(true));
+        }
+        assert!(share(f64::NAN, 1.0).is_nan() && share(1.0, f64::NAN).is_nan());
+        assert!([1.0, f64::NAN, 2.0].into_iter().fold(0.0, larger).is_nan());
     }
 }
