@@ -67,7 +67,8 @@ def _elements(energy: Energy, length: float, fields: Complex) -> tuple[Complex, 
     first, second = (np.stack([0.0 * bend[:, i], -slope[:, i] * bend[:, i], bend[:, i]], axis=1) for i in (0, 1))
     bracket = 3.0**0.5 / 12.0 * length**2
     turn = 0.5 * length * (first + second) + bracket * np.cross(first, second)
-    way = length * ALONG + bracket * np.cross(first - second, ALONG)
+    shortening = length**3 / 80.0 * (second - first)[..., 2:] ** 2
+    way = (length - shortening) * ALONG + bracket * np.cross(first - second, ALONG)
     square = np.sum(turn * turn, axis=1)[:, None]
     once = np.cross(turn, way)
     displacement = way + _series(square, 2) * once + _series(square, 3) * np.cross(turn, once)

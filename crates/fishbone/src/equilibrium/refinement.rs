@@ -20,8 +20,11 @@ const MOST: usize = 20_000;
 const MESHES: usize = 12;
 /// Greatest number of meshes that carry no equilibrium.
 const FAILURES: usize = 3;
-/// Turn of an element beyond which its equations are no longer those of a belt, in rad.
+/// Turn of an element beyond which its equations are no longer those of a belt unless a finer mesh has much the same
+/// solution, in rad.
 const MOST_TURN: f64 = 0.5;
+/// Turn of an element beyond which no finer mesh confirms it, in rad.
+const MOST_CONFIRMED_TURN: f64 = 1.5;
 /// Error beyond which an estimate tells no more than that the error is large, dimensionless.
 const LARGE: f64 = 0.05;
 /// Elements for each width V where ribs turn, a number: longer ones may settle on a false level.
@@ -94,7 +97,7 @@ pub(super) fn refine(
 /// A search for a minimum that is only a start.
 fn rough(search: &Search) -> Search {
     /// Residual of such a minimum, lengths in U and energy in mean R_f/U.
-    const ROUGH: f64 = 1e-3;
+    const ROUGH: f64 = 1e-5;
     Search {
         tolerance: search.tolerance.max(ROUGH),
         ..*search
@@ -323,10 +326,11 @@ impl Level {
         self.turn() > MOST_TURN
     }
 
-    /// Whether a finer mesh has much the same solution.
+    /// Whether a finer mesh has much the same solution, without elements that turn too far for any comparison.
     fn is_confirmed(&self) -> bool {
         let estimate = self.estimate.as_ref();
-        estimate.is_some_and(|estimate| estimate.error.largest() <= Estimate::WILD)
+        let turn = self.turn();
+        estimate.is_some_and(|e| e.error.largest() <= LARGE && turn <= MOST_CONFIRMED_TURN)
     }
 
     /// Whether the solution is an equilibrium of a belt.

@@ -98,8 +98,8 @@ pub(crate) struct RibBounds<'a, W = f64> {
 
 impl<'a, W: DualNum<Primitive = f64> + Copy> RibBounds<'a, W> {
     /// Slacks of the ribs against crossing on the board, by slopes at both ends of the element; admissible where positive:
-    /// 1e-5 less than `1 − s v` at the +ζ and at the −ζ edge of the stretch, then [`Edge::slack`] at the active edges, 1 where there are
-    /// none.
+    /// 1e-5 less than `1 − s v` at the +ζ and at the −ζ edge of the stretch, then [`Edge::slack`] at the active edges, 1
+    /// where there are none.
     ///
     /// On an arc v is where the rib meets the inner edge; towards the outer one, which a rib meets before V/2, it is V/2
     /// all the same, so that |s| ≤ 2/V holds everywhere.

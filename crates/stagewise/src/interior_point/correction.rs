@@ -33,6 +33,8 @@ pub fn correct<P: Program<X, U, N>, const X: usize, const U: usize, const N: usi
     tolerance: f64,
     near: Stationary<P::Point>,
 ) -> Option<Correction<P::Point>> {
+    /// Damping of directions that cost nothing, along which the gradient has no part; second derivative per unit weight.
+    const FREE: f64 = 1e-6;
     let (mut iterate, _) = PrimalDual::new(program, 0.0, near.point);
     iterate.multipliers = near.multipliers;
     iterate.set_barrier(tolerance);
@@ -43,8 +45,9 @@ pub fn correct<P: Program<X, U, N>, const X: usize, const U: usize, const N: usi
     let nodes = iterate.gradient.iter().zip(&curvatures);
     let gains = nodes.map(|(gradient, curvature)| gain::<X, U, N>(gradient, curvature));
     let gains = gains.collect();
-    if iterate.kkt.factorise_damped(0.0).is_err() {
-        iterate.kkt.factorise_exactly().ok()?;
+    let kkt = &mut iterate.kkt;
+    if kkt.factorise_damped(0.0).is_err() && kkt.factorise_exactly().is_err() {
+        kkt.factorise_damped(FREE).ok()?;
     }
     let stationarity = iterate.gradient.clone();
     iterate.find_step();
