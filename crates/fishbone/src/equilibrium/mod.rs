@@ -6,9 +6,11 @@ pub(crate) mod guess;
 mod intrinsic;
 mod refinement;
 mod search;
+mod side;
 mod spans;
 mod stability;
 mod warnings;
+mod winding;
 
 use crate::names::named;
 pub use accuracy::MeshError;
@@ -263,16 +265,31 @@ enum Start<'a> {
     Shape(&'a BeltPoint),
     /// At a shape very near to a minimum, and nowhere else.
     Close(&'a BeltPoint),
+    /// On a mesh that is fine enough, at a shape very near to a minimum, and nowhere else.
+    Twin(&'a Mesh, &'a BeltPoint),
 }
 
-/// The equilibrium of a problem that is found from the guess.
+/// The equilibrium of a problem: found from the guess, or followed from a quarter turn where supports are turned by more than
+/// half a turn.
 ///
 /// `proceed` is asked once an iteration whether to go on.
 pub(crate) fn from_guess(
     problem: &Problem,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Equilibrium {
-    intrinsic::solve(problem, Start::Guess, proceed)
+    match winding::wound(problem, proceed) {
+        Some(found) => found,
+        None => beside_the_guess(problem, proceed),
+    }
+}
+
+/// The equilibrium that is found from the guess, on the side of the bulge if there is one.
+fn beside_the_guess(
+    problem: &Problem,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Equilibrium {
+    let found = intrinsic::solve(problem, Start::Guess, proceed);
+    side::on_side_of_bulge(found, proceed)
 }
 
 /// The minimum that is found from bend and rib slope at equal steps of the arc length, and from nowhere else.
