@@ -24,7 +24,7 @@ use crate::scenario::{SAME_PLACE, Scenario};
 use crate::strip::spine::Spine;
 use crate::surface::{HighestPoint, highest_point};
 use accuracy::Estimate;
-use guess::{guess, waved};
+use guess::{folded_band, guess, waved};
 use nalgebra::{Vector2, Vector3};
 use stagewise::{Inertia, Multipliers, Residuals, Stationary, Values};
 use std::ops::ControlFlow;
@@ -182,6 +182,11 @@ impl Equilibrium {
         }
     }
 
+    /// Whether the solve has converged, to a minimum as far as is known.
+    fn is_minimum(&self) -> bool {
+        self.status == Status::Converged && self.stability.is_none_or(|s| s.negative_modes == 0)
+    }
+
     /// The largest displacement in U of a node to the same place of the same belt in another shape.
     pub(crate) fn displacement(&self, other: &Self) -> f64 {
         let length = self.spine.length();
@@ -283,13 +288,38 @@ pub(crate) fn from_guess(
     }
 }
 
-/// The equilibrium that is found from the guess, on the side of the bulge if there is one.
+/// A closed belt with the half turns that it was given: if it lost them as it was twisted up, the minimum that a search from a
+/// folded band finds; without such a minimum the belt as it was found.
+fn with_half_turns(
+    found: Equilibrium,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Equilibrium {
+    let problem = &found.problem;
+    let given = problem.scenario().belt.half_turns.unwrap_or(0);
+    if found.half_turns.is_none_or(|made| made == given) {
+        return found;
+    }
+    let program = problem.program(problem.elements());
+    let band = folded_band(&program, given, &problem.bulge());
+    let mut other = minimum_from(problem, &band, proceed);
+    let iterations = found.iterations + other.iterations;
+    if other.is_minimum() && other.half_turns == Some(given) {
+        other.iterations = iterations;
+        return other;
+    }
+    Equilibrium {
+        iterations,
+        ..found
+    }
+}
+
+/// The equilibrium that is found from the guess, with its half turns and on the side of the bulge where there is one.
 fn beside_the_guess(
     problem: &Problem,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Equilibrium {
     let found = intrinsic::solve(problem, Start::Guess, proceed);
-    side::on_side_of_bulge(found, proceed)
+    side::on_side_of_bulge(with_half_turns(found, proceed), proceed)
 }
 
 /// The minimum that is found from bend and rib slope at equal steps of the arc length, and from nowhere else.

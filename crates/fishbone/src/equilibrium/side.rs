@@ -2,7 +2,7 @@
 
 use super::intrinsic::solve;
 use super::search::{fields_at, prolong};
-use super::{Equilibrium, Solved, Start, Status, minimum_from};
+use super::{Equilibrium, Solved, Start, minimum_from};
 use crate::geometry::Pose;
 use crate::problem::program::{BeltPoint, BeltProgram, NodeSupport, Piece};
 use crate::problem::{Mesh, Problem};
@@ -122,13 +122,6 @@ pub(super) fn on_side_of_bulge(
         found.warnings.push(warning.to_owned());
     }
     found
-}
-
-impl Equilibrium {
-    /// Whether the solve has converged, to a minimum as far as is known.
-    fn is_minimum(&self) -> bool {
-        self.status == Status::Converged && self.stability.is_none_or(|s| s.negative_modes == 0)
-    }
 }
 
 /// A mirror that takes a belt to a belt: the frames, as columns, from R to Q R S. Q is the mirror of space, S the mirror of
