@@ -281,7 +281,7 @@ struct Image {
 }
 
 impl Image {
-    /// The images of a shape on the side of the bulge, those first that miss the supports least.
+    /// The images of a shape on the side of the bulge: twins first, then those that miss the supports least.
     fn all(problem: &Problem, solved: &Solved) -> Vec<Self> {
         /// Relative difference of the energies of mirror images, by rounding and by a mesh that is not symmetric.
         const LEVEL: f64 = 1e-3;
@@ -311,7 +311,9 @@ impl Image {
         let mirrors = Mirror::all(program.half_turns.is_some());
         let mirrors = mirrors.filter(|mirror| !(is_twisted && mirror.changes_hand()));
         let mut images: Vec<_> = mirrors.map(image).filter(is_right).collect();
-        images.sort_by(|a, b| a.miss.total_cmp(&b.miss));
+        // Rounding must not choose between twins.
+        let rank = |image: &Self| if image.is_twin { 0.0 } else { image.miss };
+        images.sort_by(|a, b| rank(a).total_cmp(&rank(b)));
         images.dedup_by(|b, a| a.shape.distance(&b.shape) <= MET);
         images
     }
@@ -343,5 +345,80 @@ impl Image {
         let program = problem.program(problem.elements());
         let shape = prolong(&solved.program, &self.shape, &program);
         minimum_from(problem, &shape, proceed)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::{BeltSpec, Component, Place, Scenario, SegmentSpec, SupportSpec};
+
+    /// A belt between parallel clamps, or between pins.
+    fn problem(end: [f64; 3], is_clamped: bool, bulge: [f64; 3]) -> Problem {
+        let mut scenario = Scenario::new(BeltSpec::new(0.1, 1.0, vec![SegmentSpec::straight(1.0)]));
+        let held = |at, position: [f64; 3]| SupportSpec {
+            position: Some(position.map(Component::Held)),
+            rotation: is_clamped.then_some([0.0; 3]),
+            ..SupportSpec::new(at)
+        };
+        scenario.supports = vec![held(Place::Start, [0.0; 3]), held(Place::End, end)];
+        scenario.solver.elements = Some(80);
+        scenario.solver.bulge = bulge;
+        Problem::new(scenario).unwrap()
+    }
+
+    /// The minimum on the side of +x, then that to which a bulge along −x leads from there.
+    fn both_sides(end: [f64; 3], is_clamped: bool) -> [Equilibrium; 2] {
+        let proceed = &mut || ControlFlow::Continue(());
+        let first = solve(
+            &problem(end, is_clamped, [1.0, 0.0, 0.0]),
+            Start::Guess,
+            proceed,
+        );
+        let turned = Equilibrium {
+            problem: problem(end, is_clamped, [-1.0, 0.0, 0.0]),
+            ..first.clone()
+        };
+        assert_eq!((first.side(), turned.side()), (1, -1));
+        let other = on_side_of_bulge(turned, proceed);
+        assert_eq!(other.side(), 1);
+        assert!(other.warnings.is_empty());
+        assert!((other.energy - first.energy).abs() < 1e-8 * first.energy);
+        assert!(
+            other.iterations < first.iterations + 15,
+            "a few Newton steps"
+        );
+        [first, other]
+    }
+
+    /// Largest distance of the nodes from those of the other shape's mirror image.
+    fn distance(
+        [one, other]: &[Equilibrium; 2],
+        image: impl Fn(usize, &[Pose]) -> Vector3<f64>,
+    ) -> f64 {
+        let poses = one.spine.pose.iter().enumerate();
+        let off = poses.map(|(k, pose)| (pose.position - image(k, &other.spine.pose)).norm());
+        off.fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn test_twin_across_a_plane_is_found() {
+        for is_clamped in [true, false] {
+            let found = both_sides([0.0, 0.6, 0.0], is_clamped);
+            let image = |k: usize, poses: &[Pose]| {
+                let [x, y, z] = poses[k].position.into();
+                Vector3::new(-x, y, z)
+            };
+            assert!(distance(&found, image) < 1e-6);
+        }
+    }
+
+    #[test]
+    fn test_twin_that_exchanges_the_ends_is_found() {
+        let end = [0.15, 0.5, 0.0];
+        let found = both_sides(end, true);
+        let image =
+            |k: usize, poses: &[Pose]| Vector3::from(end) - poses[poses.len() - 1 - k].position;
+        assert!(distance(&found, image) < 1e-6);
     }
 }
