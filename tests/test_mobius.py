@@ -154,6 +154,24 @@ def test_result_has_the_half_turns_that_it_ended_with(half_turns: int) -> None:
     assert result(solve(closed(half_turns, elements=elements)))["half_turns"] == half_turns
 
 
+@pytest.mark.parametrize("hand", [1, -1])
+@pytest.mark.parametrize(("width", "energy"), [(0.1, 135.103), (0.05, 132.88)])
+def test_band_keeps_three_half_turns(width: float, energy: float, hand: int) -> None:
+    """The energies are those of a boundary value solver of its own, at rigidity and length 1."""
+    band = solve(board([straight(1.0)], [], closed=True, half_turns=3 * hand, width=width, energy="wunderlich"))
+    assert band.half_turns == 3 * hand
+    assert band.stable
+    assert band.warnings == []
+    assert band.energy == pytest.approx(energy, rel=2e-4)
+
+
+def test_band_that_keeps_no_half_turns_is_warned_of() -> None:
+    band = solve(board([straight(1.0)], [], closed=True, half_turns=4, width=0.1, elements=80))
+    assert band.half_turns == 0
+    [warning] = band.warnings
+    assert "it was given 4 half turns and ended with 0" in warning
+
+
 def test_moebius_band_is_a_minimum() -> None:
     """MODEL §6: the flip-symmetric state; moving the seam along the band is free."""
     assert solve(closed(1)).stable is not False

@@ -41,6 +41,7 @@ KEYS = {
     "edges",
     "internal",
     "supports",
+    "side",
     "least_bend_radius",
     "bend_radius",
     "rib_margin",

@@ -31,7 +31,7 @@ GOLDEN: dict[str, tuple[float, tuple[float, float, float]]] = {
     "mobius": (18.63 * np.pi / 30.0, (0.1301, 0.1259, -0.1144)),
     "planar": (17.6586, (0.3487, 0.3000, 0.0)),
     "polystyrene": (1.9521e-3, (0.3684, 0.2500, 0.0500)),
-    "twist": (20.809, (0.0092, 0.6017, -0.1309)),
+    "twist": (20.809, (0.1549, 0.2775, -0.0001)),
 }
 
 names = pytest.mark.parametrize("name", GOLDEN)

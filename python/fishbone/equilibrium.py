@@ -385,6 +385,16 @@ class Equilibrium:
         return HighestPoint(u, np.array(position))
 
     @property
+    def side(self) -> int:
+        """The side to which the belt bulges: 1 along the scenario's `bulge`, -1 against it, 0 where it lies on neither.
+
+        It is the sign of the mean distance of the spine along `bulge` from the straight lines between the places where
+        supports hold a position; with fewer than two such places, from the tangent at that place, or at the start. A
+        mean distance within 1e-4 U is 0, and a belt that no support holds has no side.
+        """
+        return self._inner.side
+
+    @property
     def least_bend_radius(self) -> BendRadius | None:
         """The least bend radius of the whole belt, often at an edge; None where nothing bends.
 

@@ -30,6 +30,8 @@ ENDS: dict[End, str] = {
 """The printed reason of the end of a branch that does not end with the path."""
 NOUGHT = 1e-9
 """Largest rounding error of a rib angle [degrees]."""
+SIDE = {1: "along solver.bulge", 0: "neither along solver.bulge nor against it", -1: "against solver.bulge"}
+"""The side to which a belt bulges."""
 MINIMUM = {True: "yes", False: "no", None: "not known"}
 """Whether an equilibrium is a local minimum."""
 
@@ -106,7 +108,8 @@ def _supports(equilibrium: Equilibrium) -> str:
 def _held(support: dict[str, Any]) -> str:
     """The constraint of a support in words."""
     if support.get("hinge") is not None:
-        return f"hinged about {support['hinge']}"
+        moment = support.get("moment")
+        return f"hinged about {support['hinge']}" + ("" if moment is None else f" with moment {number(moment)}")
     position = support.get("position")
     turned = any(support.get(key) is not None for key in ("rotation", "euler", "quaternion"))
     if position is not None and "free" in position:
@@ -121,6 +124,7 @@ def _quantities(equilibrium: Equilibrium) -> Iterator[tuple[str, str, str]]:
     if equilibrium.elastic_energy != equilibrium.energy:
         yield "elastic energy", number(equilibrium.elastic_energy), ""
     yield from _extremes(equilibrium)
+    yield "side", f"{equilibrium.side:+d}" if equilibrium.side else "0", SIDE[equilibrium.side]
     if equilibrium.half_turns is not None:
         yield "half turns", str(equilibrium.half_turns), "of a closed belt"
     yield "crosses itself", *_crossing(equilibrium.crosses_itself)

@@ -240,6 +240,12 @@ impl Equilibrium {
         self.solved.half_turns
     }
 
+    /// 1, 0 or −1.
+    #[getter]
+    fn side(&self) -> i8 {
+        self.solved.side()
+    }
+
     /// (u, position).
     #[getter]
     fn highest_point(&self) -> (f64, [f64; 3]) {

@@ -132,6 +132,23 @@ pub(crate) fn ring(program: &BeltProgram, bulge: &Vector3<f64>) -> BeltPoint {
     }
 }
 
+/// The start for a closed belt that is to keep more half turns than a ring twisted up keeps: as many bends to and fro as half
+/// turns, twisted alike, around an axis about which it looks the same from as many sides.
+pub(crate) fn folded_band(
+    program: &BeltProgram,
+    half_turns: i32,
+    bulge: &Vector3<f64>,
+) -> BeltPoint {
+    /// Amplitude of the bend for each half turn, in rad/U.
+    const BEND: f64 = 3.0;
+    /// Amplitude of the rib slope, dimensionless.
+    const SLOPE: f64 = 1.2;
+    let turns = f64::from(half_turns);
+    let fields =
+        |u: f64| Vector2::new(BEND * turns.abs(), -SLOPE * turns.signum()) * (PI * turns * u).cos();
+    waved(program, &ring(program, bulge), 0.0, &fields)
+}
+
 /// The belt bent to an arch, from a frame at the origin.
 fn arched(program: &BeltProgram, arch: &Arch, slopes: &[f64], frame: &Matrix3<f64>) -> BeltPoint {
     let nodes = program.nodes();

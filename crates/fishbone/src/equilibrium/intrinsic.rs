@@ -5,7 +5,7 @@ use super::active_set::settle;
 use super::refinement::{Level, refine};
 use super::search::{MinimumSettings, Search, is_flat_under_load};
 use super::stability::{self, Stability};
-use super::{Equilibrium, LinkForce, Reaction, Solved, Start, Status};
+use super::{Equilibrium, LinkForce, Reaction, Solved, Start, Status, winding};
 use crate::equilibrium::guess::{disturb, guess};
 use crate::problem::program::{self, BeltPoint, BeltProgram, ROWS};
 use crate::problem::{Problem, number};
@@ -13,6 +13,7 @@ use crate::scenario::{Scenario, SupportSpec};
 use crate::surface::linking::half_turns;
 use nalgebra::Vector3;
 use stagewise::{Inertia, Outcome, Solution, redundant_equalities};
+use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 use std::sync::OnceLock;
 
@@ -184,7 +185,7 @@ fn find(
     } = search.settings;
     let uniform = || problem.program(problem.elements());
     let mut program = match from {
-        Start::Near(mesh, _) | Start::Minimum(mesh, _) => {
+        Start::Near(mesh, _) | Start::Minimum(mesh, _) | Start::Twin(mesh, _) => {
             problem.program_on(mesh).unwrap_or_else(uniform)
         }
         _ => uniform(),
@@ -192,8 +193,9 @@ fn find(
     if !problem.has_fixed_mesh() {
         let start = match from {
             Start::Guess => Some(None),
-            Start::Shape(shape) | Start::Minimum(_, shape) => Some(Some((&program, shape))),
-            Start::Near(..) | Start::Close(_) => None,
+            Start::Shape(shape) => Some(Some((&program, shape, cold_barrier))),
+            Start::Minimum(_, shape) => Some(Some((&program, shape, close_barrier))),
+            Start::Near(..) | Start::Close(_) | Start::Twin(..) => None,
         };
         if let Some(start) = start {
             return refine(problem, &search, start, proceed).into();
@@ -202,7 +204,7 @@ fn find(
     let solution = match from {
         Start::Near(_, shape) => search.from(&program, shape.clone(), proceed),
         Start::Shape(shape) => search.only_from(&program, shape.clone(), cold_barrier, proceed),
-        Start::Close(shape) | Start::Minimum(_, shape) => {
+        Start::Close(shape) | Start::Minimum(_, shape) | Start::Twin(_, shape) => {
             search.only_from(&program, shape.clone(), close_barrier, proceed)
         }
         Start::Guess => {
@@ -377,12 +379,17 @@ fn warnings(
 
 /// The warning of an orientation given by more than a turn, as degrees would be.
 fn more_than_a_turn((i, support): (usize, &SupportSpec)) -> Option<String> {
-    let angles = support.rotation.or(support.euler)?;
-    let largest = angles
-        .iter()
-        .fold(0.0, |most: f64, angle| most.max(angle.abs()));
-    (largest > std::f64::consts::TAU).then(|| {
-        format!("supports[{i}] is turned by {largest} rad, which is more than a turn: angles are in radians")
+    let rotation = support.rotation.map(|r| Vector3::from(r).norm());
+    let largest = rotation.or_else(|| Some(Vector3::from(support.euler?).amax()))?;
+    let way = match largest > winding::MOST {
+        true => "it is taken the shorter way round, and ",
+        false => "",
+    };
+    (largest > TAU + 1e-9).then(|| {
+        format!(
+            "supports[{i}] is turned by {} rad, which is more than a turn: {way}angles are in radians",
+            number(largest)
+        )
     })
 }
 

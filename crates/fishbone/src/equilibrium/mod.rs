@@ -6,9 +6,11 @@ pub(crate) mod guess;
 mod intrinsic;
 mod refinement;
 mod search;
+mod side;
 mod spans;
 mod stability;
 mod warnings;
+mod winding;
 
 use crate::names::named;
 pub use accuracy::MeshError;
@@ -22,7 +24,7 @@ use crate::scenario::{SAME_PLACE, Scenario};
 use crate::strip::spine::Spine;
 use crate::surface::{HighestPoint, highest_point};
 use accuracy::Estimate;
-use guess::{guess, waved};
+use guess::{folded_band, guess, waved};
 use nalgebra::{Vector2, Vector3};
 use stagewise::{Inertia, Multipliers, Residuals, Stationary, Values};
 use std::ops::ControlFlow;
@@ -186,6 +188,11 @@ impl Equilibrium {
         }
     }
 
+    /// Whether the solve has converged, to a minimum as far as is known.
+    fn is_minimum(&self) -> bool {
+        self.status == Status::Converged && self.stability.is_none_or(|s| s.negative_modes == 0)
+    }
+
     /// The largest displacement in U of a node to the same place of the same belt in another shape.
     pub(crate) fn displacement(&self, other: &Self) -> f64 {
         let length = self.spine.length();
@@ -269,16 +276,56 @@ enum Start<'a> {
     Shape(&'a BeltPoint),
     /// At a shape very near to a minimum, and nowhere else.
     Close(&'a BeltPoint),
+    /// On a mesh that is fine enough, at a shape very near to a minimum, and nowhere else.
+    Twin(&'a Mesh, &'a BeltPoint),
 }
 
-/// The equilibrium of a problem that is found from the guess.
+/// The equilibrium of a problem: found from the guess, or followed from a quarter turn where supports are turned by more than
+/// half a turn.
 ///
 /// `proceed` is asked once an iteration whether to go on.
 pub(crate) fn from_guess(
     problem: &Problem,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Equilibrium {
-    intrinsic::solve(problem, Start::Guess, proceed)
+    match winding::wound(problem, proceed) {
+        Some(found) => found,
+        None => beside_the_guess(problem, proceed),
+    }
+}
+
+/// A closed belt with the half turns that it was given: if it lost them as it was twisted up, the minimum that a search from a
+/// folded band finds; without such a minimum the belt as it was found.
+fn with_half_turns(
+    found: Equilibrium,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Equilibrium {
+    let problem = &found.problem;
+    let given = problem.scenario().belt.half_turns.unwrap_or(0);
+    if found.half_turns.is_none_or(|made| made == given) {
+        return found;
+    }
+    let program = problem.program(problem.elements());
+    let band = folded_band(&program, given, &problem.bulge());
+    let mut other = minimum_from(problem, &band, proceed);
+    let iterations = found.iterations + other.iterations;
+    if other.is_minimum() && other.half_turns == Some(given) {
+        other.iterations = iterations;
+        return other;
+    }
+    Equilibrium {
+        iterations,
+        ..found
+    }
+}
+
+/// The equilibrium that is found from the guess, with its half turns and on the side of the bulge where there is one.
+fn beside_the_guess(
+    problem: &Problem,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Equilibrium {
+    let found = intrinsic::solve(problem, Start::Guess, proceed);
+    side::on_side_of_bulge(with_half_turns(found, proceed), proceed)
 }
 
 /// The minimum that is found from bend and rib slope at equal steps of the arc length, and from nowhere else.

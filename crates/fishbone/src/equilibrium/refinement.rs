@@ -41,15 +41,15 @@ pub(super) struct Level {
 }
 
 /// Finds a minimum on meshes graded to the estimated error, until the error is as small as the problem asks: from a shape of
-/// a programme, on its mesh first; without one from the guess. If no mesh carries the accuracy, the best result of all.
+/// a programme, on its mesh first, with a first barrier; without one from the guess. If no mesh carries the accuracy, the best result of all.
 pub(super) fn refine(
     problem: &Problem,
     search: &Search,
-    start: Option<(&BeltProgram, &BeltPoint)>,
+    start: Option<(&BeltProgram, &BeltPoint, f64)>,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Level {
     let (mut best, mut mesh) = match start {
-        Some((program, _)) => (None, Mesh::of(problem, program)),
+        Some((program, ..)) => (None, Mesh::of(problem, program)),
         None => first_level(problem, search, proceed),
     };
     let mut iterations = best.as_ref().map_or(0, |level| level.solution.iterations);
@@ -63,12 +63,14 @@ pub(super) fn refine(
             Some(best) => best.on_finer(problem, search, program, proceed),
             None => {
                 let barrier = search.settings.cold_barrier;
-                let search = if start.is_none() {
+                let barrier = start.map_or(barrier, |(_, _, barrier)| barrier);
+                let near = start.map(|(program, shape, _)| (program, shape));
+                let search = if near.is_none() {
                     rough(search)
                 } else {
                     *search
                 };
-                Level::on(problem, &search, program, start, barrier, proceed)
+                Level::on(problem, &search, program, near, barrier, proceed)
             }
         };
         // A long step tells where the mesh has to be finer, and no more is asked here.

@@ -347,7 +347,7 @@ pub(super) fn prolong_inequalities(
 }
 
 /// The fields at an arc length in U, before or after the jump where there is one.
-fn fields_at(
+pub(super) fn fields_at(
     program: &BeltProgram,
     nodes: &[f64],
     point: &BeltPoint,

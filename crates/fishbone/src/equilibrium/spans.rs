@@ -98,12 +98,24 @@ impl Span {
         let length: f64 = pieces.iter().map(Piece::length).sum();
         let origin = reached.map_or(Vector3::zeros(), |pose| pose.position);
         let pieces = pieces.iter().map(|piece| scaled(piece, length)).collect();
+        let hold = |hold: Hold| match hold {
+            Hold::Hinge {
+                frame,
+                axis,
+                moment,
+            } => Hold::Hinge {
+                frame,
+                axis,
+                moment: length * moment,
+            },
+            Hold::Free | Hold::Frame(_) => hold,
+        };
         let local = |support: &NodeSupport| NodeSupport {
             node: support.node - nodes.start,
             position: [0, 1, 2].map(|i| Some((support.position[i]? - origin[i]) / length)),
             // Ribs square at both ends go on from span to span.
             square_rib: support.square_rib || support.node == nodes.end,
-            hold: support.hold,
+            hold: hold(support.hold),
         };
         let own = |support: &&NodeSupport| {
             let from = nodes.start + usize::from(reached.is_some());

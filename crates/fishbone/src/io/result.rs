@@ -38,6 +38,7 @@ pub(crate) struct Record<'a> {
     supports: Vec<Support>,
     links: Vec<Link>,
     highest_point: HighestPoint,
+    side: i8,
     least_bend_radius: LeastBendRadius,
     least_spine_radius: LeastSpineRadius,
     bend_radius: BendRadius,
@@ -194,6 +195,7 @@ impl<'a> Record<'a> {
                 u: highest.u,
                 position: highest.position.into(),
             },
+            side: equilibrium.side(),
             least_bend_radius: LeastBendRadius::new(surface::least_bend_radius(spine)),
             least_spine_radius: LeastSpineRadius::new(spine_radius),
             bend_radius: BendRadius {

@@ -141,7 +141,7 @@ impl Problem {
         NodeSupport {
             node: places.node(support.at.arc_length(length) / length),
             position: [0, 1, 2].map(|i| Some((support.components()[i]? - self.origin[i]) / length)),
-            hold: hold(support),
+            hold: hold(support, support.moment.unwrap_or(0.0) / self.units.energy),
             square_rib: self.scenario.is_square_rib(support),
         }
     }
@@ -201,7 +201,8 @@ fn at_rest() -> NodeSupport {
     }
 }
 
-fn hold(support: &SupportSpec) -> Hold {
+/// The hold of a support, with the moment about its hinge in the units of the programme.
+fn hold(support: &SupportSpec, moment: f64) -> Hold {
     let quaternion = |frame: Matrix3<f64>| {
         UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(frame))
     };
@@ -215,6 +216,7 @@ fn hold(support: &SupportSpec) -> Hold {
                 Axis::Eta => 1,
                 Axis::Zeta => 2,
             },
+            moment,
         },
     }
 }

@@ -167,6 +167,39 @@ impl Problem {
         })
     }
 
+    /// The largest angle by which a rotation vector turns a support; 0 where all supports turn alike, and so none against
+    /// another. Units: rad.
+    pub(crate) fn largest_turn(&self) -> f64 {
+        let turned = self
+            .scenario
+            .supports
+            .iter()
+            .filter(|s| s.frame().is_some());
+        let rotations: Vec<_> = turned.map(|support| support.rotation).collect();
+        let are_alike = rotations.len() > 1 && rotations.iter().all(|r| *r == rotations[0]);
+        let angles = rotations.iter().flatten().map(|r| Vector3::from(*r).norm());
+        match are_alike {
+            true => 0.0,
+            false => angles.fold(0.0, f64::max),
+        }
+    }
+
+    /// The same problem with a share of all rotation vectors that turn a support by more than an angle.
+    pub(crate) fn turned_back(&self, angle: f64, share: f64) -> Self {
+        let mut scenario = Scenario::clone(&self.scenario);
+        let supports = scenario.supports.iter_mut();
+        for rotation in supports.filter_map(|support| support.rotation.as_mut()) {
+            let vector = Vector3::from(*rotation);
+            if vector.norm() > angle {
+                *rotation = (share * vector).into();
+            }
+        }
+        Self {
+            scenario: Arc::new(scenario),
+            ..self.clone()
+        }
+    }
+
     /// The problem of a scenario with the same belt.
     fn on_the_same_belt(&self, scenario: Scenario) -> Result<Self, ScenarioError> {
         scenario.validate()?;

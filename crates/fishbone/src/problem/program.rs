@@ -149,19 +149,28 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         self
     }
 
-    /// The programme under a share of its weight and loads.
+    /// The programme under a share of its weight, loads and moments.
     pub(crate) fn under_share_of_loads(mut self, share: f64) -> Self {
         self.weight *= share;
+        for support in &mut self.supports {
+            if let Hold::Hinge { moment, .. } = &mut support.hold {
+                *moment *= share;
+            }
+        }
         for load in &mut self.loads {
             load.load.force *= share;
         }
         self
     }
 
-    /// Sum of the sizes of weight and loads, in mean R_f/U².
+    /// Sum of the sizes of weight, loads and moments, in mean R_f/U².
     pub(crate) fn total_load(&self) -> f64 {
         let forces = self.loads.iter().map(|load| load.load.force.norm());
-        self.weight.norm() + forces.sum::<f64>()
+        let moments = self
+            .supports
+            .iter()
+            .map(|support| support.hold.moment().abs());
+        self.weight.norm() + forces.sum::<f64>() + moments.sum::<f64>()
     }
 
     /// Fields that a stiffened stretch prescribes at a node: no bend inside, square ribs at its ends too.
@@ -312,12 +321,11 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         self.elements().map(energy).sum()
     }
 
-    /// Potential of weight and loads.
+    /// Potential of weight, loads and moments.
     pub(crate) fn load_potential(&self, poses: &[Pose]) -> f64 {
         let loads = self.loads.iter();
-        let dead: f64 = loads
-            .map(|load| load.load.potential(&poses[load.node]))
-            .sum();
+        let dead = loads.map(|load| load.load.potential(&poses[load.node]));
+        let dead = dead.sum::<f64>() + self.potential_of_moments(poses);
         let weight = |(k, piece): (usize, &Piece)| {
             let ends = load::weight(&self.weight, piece.length());
             ends[0].potential(&poses[k]) + ends[1].potential(&poses[k + 1])
@@ -328,9 +336,35 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         }
     }
 
-    /// Whether weight or dead forces act.
+    /// Potential of the moments of hinges: minus moment times angle. The angle is followed along the belt from the first
+    /// support that holds a whole frame, or else from the first that holds a hinge's axis.
+    fn potential_of_moments(&self, poses: &[Pose]) -> f64 {
+        let frame = |support: &NodeSupport| {
+            let frame = support.hold.frame()?.to_rotation_matrix().into_inner();
+            Some((support.node, frame))
+        };
+        let is_whole = |support: &&NodeSupport| matches!(support.hold, Hold::Frame(_));
+        let whole = self.supports.iter().find(is_whole);
+        let origin = whole.or_else(|| self.supports.iter().find(|s| frame(s).is_some()));
+        let Some((from, origin)) = origin.and_then(frame) else {
+            return 0.0;
+        };
+        let potential = |support: &NodeSupport| {
+            let between = &poses[from.min(support.node)..=from.max(support.node)];
+            let frames = between.iter().map(|pose| &pose.frame);
+            let turned = match from <= support.node {
+                true => support.turned(&origin, frames),
+                false => support.turned(&origin, frames.rev()),
+            };
+            Some(-support.hold.moment() * turned?)
+        };
+        self.supports.iter().filter_map(potential).sum()
+    }
+
+    /// Whether weight, dead forces or moments act.
     pub(crate) fn is_loaded(&self) -> bool {
-        !self.is_weightless() || !self.loads.is_empty()
+        let bears_moment = |support: &NodeSupport| support.hold.moment() != 0.0;
+        !self.is_weightless() || !self.loads.is_empty() || self.supports.iter().any(bears_moment)
     }
 
     fn is_weightless(&self) -> bool {
@@ -363,7 +397,7 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
     fn wrenches(&self, point: &BeltPoint<F>, multipliers: &[f64], into: &mut [NodeVector<N>]) {
         for (i, support) in self.supports.iter().enumerate() {
             let rows = rows_of(multipliers, i);
-            let force = support.jacobian(&point.poses[support.node]).tr_mul(&rows);
+            let force = support.generalised_force(&point.poses[support.node], &rows);
             add_wrench(&mut into[support.node], &force);
         }
         for (i, link) in self.links.iter().enumerate() {

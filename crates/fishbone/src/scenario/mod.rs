@@ -337,6 +337,7 @@ impl SupportSpec {
             euler: None,
             quaternion: None,
             hinge: None,
+            moment: None,
             square_rib: None,
         }
     }

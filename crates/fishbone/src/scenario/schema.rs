@@ -243,6 +243,10 @@ table! {
         /// Body axis about which the held frame is free to turn.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         pub hinge: Option<Axis>,
+        /// Moment on the belt about the axis of the hinge, right-handed; its potential is minus moment times angle.
+        /// Units: N·m.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub moment: Option<f64>,
         /// Whether the rib is square to the spine, β = 0. Default: at an end with both position and orientation.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         pub square_rib: Option<bool>,

@@ -2,7 +2,8 @@
 
 use super::Rows;
 use crate::geometry::{Pose, carried_hessian, hat};
-use nalgebra::{Matrix3, Matrix6, Rotation3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Matrix6, Rotation3, UnitQuaternion, Vector3, Vector6};
+use std::f64::consts::TAU;
 
 /// The prescribed part of a node's frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,6 +18,8 @@ pub enum Hold {
         frame: UnitQuaternion<f64>,
         /// Body axis: 0, 1, 2 for ξ, η, ζ.
         axis: usize,
+        /// Moment on the belt about the axis, in mean R_f/U.
+        moment: f64,
     },
 }
 
@@ -26,6 +29,14 @@ impl Hold {
         match self {
             Self::Free => None,
             Self::Frame(frame) | Self::Hinge { frame, .. } => Some(*frame),
+        }
+    }
+
+    /// The moment about a hinge's axis; 0 where there is none.
+    pub(crate) fn moment(&self) -> f64 {
+        match self {
+            Self::Hinge { moment, .. } => *moment,
+            Self::Free | Self::Frame(_) => 0.0,
         }
     }
 }
@@ -176,6 +187,57 @@ impl AxisGap {
     }
 }
 
+/// The angle by which a frame is turned about the axis of a hinge: that of the turn about the axis which, followed by the
+/// shortest turn that tilts the axis, leads from the prescribed frame to the present one. With derivatives by the body
+/// rotation.
+///
+/// The angle is determined but for whole turns, and regular unless the axes oppose each other.
+#[derive(Debug, Clone, Copy)]
+struct HingeAngle {
+    axis: usize,
+    /// Rotation from the prescribed frame to the present one.
+    gap: UnitQuaternion<f64>,
+}
+
+impl HingeAngle {
+    fn new(prescribed: &UnitQuaternion<f64>, axis: usize, frame: &Matrix3<f64>) -> Self {
+        let now = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(*frame));
+        Self {
+            axis,
+            gap: prescribed.conjugate() * now,
+        }
+    }
+
+    /// The angle, between −2π and 2π.
+    fn value(&self) -> f64 {
+        2.0 * self.gap.imag()[self.axis].atan2(self.gap.w)
+    }
+
+    /// Derivatives of the angle, and of the logarithm of cos(tilt/2).
+    fn gradients(&self) -> [Vector3<f64>; 2] {
+        let (scalar, vector) = (self.gap.w, self.gap.imag());
+        let along = vector[self.axis];
+        let scalar_by = -0.5 * vector;
+        let axis = Vector3::ith(self.axis, 1.0);
+        let along_by = 0.5 * (scalar * axis + axis.cross(&vector));
+        let square = scalar * scalar + along * along;
+        [
+            2.0 / square * (scalar * along_by - along * scalar_by),
+            (scalar * scalar_by + along * along_by) / square,
+        ]
+    }
+
+    fn gradient(&self) -> Vector3<f64> {
+        self.gradients()[0]
+    }
+
+    fn hessian(&self) -> Matrix3<f64> {
+        let [angle, tilt] = self.gradients();
+        let mixed = angle * tilt.transpose();
+        -(mixed + mixed.transpose())
+    }
+}
+
 /// The gap between the present frame and the prescribed part of it.
 enum Gap {
     None,
@@ -209,16 +271,17 @@ impl Gap {
     }
 }
 
-/// Derivatives of a support's conditions on a frame by turns of the frame, from the left and in world axes.
+/// Derivatives of a support's conditions on a frame, and of the potential of its moment, by turns of the frame, from the left
+/// and in world axes.
 ///
 /// They depend only on the rotation from the prescribed frame to the present frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Turn {
     /// Derivative of the conditions.
     pub(crate) jacobian: Matrix3<f64>,
-    /// Generalised force: the derivative of multipliers times conditions.
+    /// Generalised force: the derivative of multipliers times conditions, and of the potential.
     pub(crate) generalised_force: Vector3<f64>,
-    /// Second derivative of multipliers times conditions along single turns.
+    /// Second derivative of multipliers times conditions, and of the potential, along single turns.
     pub(crate) hessian: Matrix3<f64>,
 }
 
@@ -244,7 +307,67 @@ impl NodeSupport {
         match &self.hold {
             Hold::Free => Gap::None,
             Hold::Frame(frame) => Gap::Rotation(RotationGap::new(frame, &pose.frame)),
-            Hold::Hinge { frame, axis } => Gap::Axis(AxisGap::new(frame, *axis, &pose.frame)),
+            Hold::Hinge { frame, axis, .. } => Gap::Axis(AxisGap::new(frame, *axis, &pose.frame)),
+        }
+    }
+
+    /// The angle about the axis of a hinge, but for whole turns; `None` without a hinge that bears a moment.
+    fn angle(&self, frame: &Matrix3<f64>) -> Option<HingeAngle> {
+        match &self.hold {
+            Hold::Hinge {
+                frame: prescribed,
+                axis,
+                moment,
+            } if *moment != 0.0 => Some(HingeAngle::new(prescribed, *axis, frame)),
+            _ => None,
+        }
+    }
+
+    /// The angle by which the last of some frames is turned about the axis of a hinge that bears a moment, followed from
+    /// frame to frame, from less than half a turn at `origin`; `None` of another support.
+    pub(super) fn turned<'a>(
+        &self,
+        origin: &'a Matrix3<f64>,
+        frames: impl Iterator<Item = &'a Matrix3<f64>>,
+    ) -> Option<f64> {
+        let shortest = |angle: f64| angle - TAU * (angle / TAU).round();
+        let mut before = self.angle(origin)?.value();
+        let mut turned = shortest(before);
+        for frame in frames {
+            let angle = self.angle(frame)?.value();
+            turned += shortest(angle - before);
+            before = angle;
+        }
+        Some(turned)
+    }
+
+    /// Derivative of the angle about the axis of a hinge that bears a moment by the node's twist in world axes about the
+    /// origin; `None` of another support.
+    pub(super) fn turned_by_twist(&self, pose: &Pose) -> Option<Vector6<f64>> {
+        let mut by_twist = Vector6::zeros();
+        let by_turn = pose.frame * self.angle(&pose.frame)?.gradient();
+        by_twist.fixed_rows_mut::<3>(3).copy_from(&by_turn);
+        Some(by_twist)
+    }
+
+    /// Generalised force of the support by the node's twist in world axes about the origin: the derivative of multipliers
+    /// times conditions, and of the potential of a hinge's moment, −moment × angle.
+    pub(super) fn generalised_force(&self, pose: &Pose, multipliers: &Rows) -> Vector6<f64> {
+        let of_conditions = self.jacobian(pose).tr_mul(multipliers);
+        match self.turned_by_twist(pose) {
+            Some(by_twist) => of_conditions - self.hold.moment() * by_twist,
+            None => of_conditions,
+        }
+    }
+
+    /// Second derivative, by body rotations, of multipliers times the frame's conditions and of the potential of a hinge's
+    /// moment.
+    fn hessian_of_frame(&self, pose: &Pose, multipliers: &Rows) -> Matrix3<f64> {
+        let weights = multipliers.fixed_rows::<3>(3).into_owned();
+        let of_conditions = self.gap(pose).hessian(&weights);
+        match self.angle(&pose.frame) {
+            Some(angle) => of_conditions - self.hold.moment() * angle.hessian(),
+            None => of_conditions,
         }
     }
 
@@ -272,12 +395,11 @@ impl NodeSupport {
         rows
     }
 
-    /// Second derivative of `multipliers · value` by the node's twist.
+    /// Second derivative of `multipliers · value`, and of the potential of a hinge's moment, by the node's twist.
     pub(super) fn hessian(&self, pose: &Pose, multipliers: &Rows) -> Matrix6<f64> {
         let force = self.held(&multipliers.fixed_rows::<3>(0).into());
         let mut hessian = carried_hessian(&pose.position, &force);
-        let weights = multipliers.fixed_rows::<3>(3).into_owned();
-        let by_turn = self.gap(pose).hessian(&weights);
+        let by_turn = self.hessian_of_frame(pose, multipliers);
         let mut turns = hessian.fixed_view_mut::<3, 3>(3, 3);
         turns += pose.frame * by_turn * pose.frame.transpose();
         hessian
@@ -291,19 +413,19 @@ impl NodeSupport {
 
     /// Derivatives of the frame's conditions by turns.
     pub(crate) fn turn(&self, pose: &Pose, multipliers: &Rows) -> Turn {
-        let gap = self.gap(pose);
-        let weights = multipliers.fixed_rows::<3>(3).into_owned();
-        let jacobian = gap.jacobian() * pose.frame.transpose();
+        let generalised_force = self.generalised_force(pose, multipliers);
+        let about_node = pose.position.cross(&generalised_force.fixed_rows::<3>(0));
+        let hessian = self.hessian_of_frame(pose, multipliers);
         Turn {
-            jacobian,
-            generalised_force: jacobian.tr_mul(&weights),
-            hessian: pose.frame * gap.hessian(&weights) * pose.frame.transpose(),
+            jacobian: self.gap(pose).jacobian() * pose.frame.transpose(),
+            generalised_force: generalised_force.fixed_rows::<3>(3) - about_node,
+            hessian: pose.frame * hessian * pose.frame.transpose(),
         }
     }
 
     /// Force and moment of the support on the belt about its point, world axes.
     pub(crate) fn reaction(&self, pose: &Pose, multipliers: &Rows) -> (Vector3<f64>, Vector3<f64>) {
-        let generalised_force = self.jacobian(pose).tr_mul(multipliers);
+        let generalised_force = self.generalised_force(pose, multipliers);
         let force: Vector3<f64> = generalised_force.fixed_rows::<3>(0).into_owned();
         let moment = generalised_force.fixed_rows::<3>(3) - pose.position.cross(&force);
         (-force, -moment)
@@ -314,7 +436,6 @@ impl NodeSupport {
 mod tests {
     use super::*;
     use crate::geometry::{Twist, exp};
-    use nalgebra::Vector6;
 
     fn frame() -> UnitQuaternion<f64> {
         UnitQuaternion::from_scaled_axis(Vector3::new(0.3, -0.4, 0.7))
@@ -342,6 +463,7 @@ mod tests {
             .map(|axis| Hold::Hinge {
                 frame: frame(),
                 axis,
+                moment: 0.8,
             })
             .collect();
         holds.push(Hold::Frame(frame()));
@@ -355,9 +477,11 @@ mod tests {
             };
             let moved = |by: Vector6<f64>| {
                 let pose = Pose::exp(&Twist::from_vector(&by)) * at;
-                support.value(&pose).dot(&weights)
+                let turned = support.turned(&at.frame, [&pose.frame].into_iter());
+                let potential = -support.hold.moment() * turned.unwrap_or(0.0);
+                support.value(&pose).dot(&weights) + potential
             };
-            let exact = support.jacobian(&at).tr_mul(&weights);
+            let exact = support.generalised_force(&at, &weights);
             let second = support.hessian(&at, &weights);
             for i in 0..6 {
                 let e_i = h * Vector6::ith(i, 1.0);
@@ -375,11 +499,31 @@ mod tests {
     }
 
     #[test]
+    fn test_angle_about_a_hinge_is_counted_beyond_whole_turns() {
+        for axis in 0..3 {
+            let about = Vector3::ith(axis, 1.0);
+            let support = support(Hold::Hinge {
+                frame: frame(),
+                axis,
+                moment: 1.0,
+            });
+            for angle in [-20.0, -3.2, 0.5, 9.5] {
+                let steps = (1..=40).map(|i| turned(about * (angle * f64::from(i) / 40.0)).frame);
+                let steps: Vec<_> = steps.collect();
+                let origin = turned(Vector3::zeros()).frame;
+                let found = support.turned(&origin, steps.iter()).unwrap();
+                assert!((found - angle).abs() < 1e-12, "{found} {angle}");
+            }
+        }
+    }
+
+    #[test]
     fn test_hinge_is_met_by_every_turn_about_its_axis_and_by_no_other() {
         for axis in 0..3 {
             let support = support(Hold::Hinge {
                 frame: frame(),
                 axis,
+                moment: 0.0,
             });
             let value = |by: Vector3<f64>| support.value(&turned(by)).norm();
             for angle in [-3.0, -1.0, 0.0, 2.0, 3.1, 6.0] {

@@ -80,6 +80,9 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
                 let by_twist = row.transpose();
                 add(by_twist, by_twist.dot(&twist(support.node)));
             }
+            if let Some(by_twist) = support.turned_by_twist(&point.poses[support.node]) {
+                add(by_twist, by_twist.dot(&twist(support.node)));
+            }
         }
         for link in &self.links {
             let [first, second] = link.jacobian::<F, N>(point);

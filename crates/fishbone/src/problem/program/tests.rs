@@ -81,6 +81,7 @@ fn program() -> BeltProgram {
             hold: Hold::Hinge {
                 frame: UnitQuaternion::from_scaled_axis(Vector3::new(0.4, 0.2, -0.1)),
                 axis: 2,
+                moment: 0.7,
             },
             square_rib: false,
         },

@@ -2,7 +2,7 @@
 
 use super::super::{LinkSpec, LoadsSpec, Place, SAME_PLACE, SupportSpec};
 use super::check::{
-    Check, at_most, bounded_vector, finite_vector, given, near, near_vector, require,
+    Check, at_most, bounded, bounded_vector, finite_vector, given, near, near_vector, require,
 };
 use crate::scenario::error::number;
 use nalgebra::Vector4;
@@ -108,6 +108,15 @@ impl SupportSpec {
                     format!("given with {ORIENTATIONS}"),
                 )
             },
+        )?;
+        require(
+            self.hinge.is_some() || self.moment.is_none(),
+            format_args!("supports[{i}].moment"),
+            || ("a moment without a hinge", "given with hinge"),
+        )?;
+        bounded(
+            format_args!("supports[{i}].moment"),
+            self.moment.unwrap_or(0.0),
         )?;
         check_angles(format_args!("supports[{i}].rotation"), self.rotation)?;
         check_angles(format_args!("supports[{i}].euler"), self.euler)?;

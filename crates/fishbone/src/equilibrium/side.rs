@@ -1,0 +1,424 @@
+//! The side to which a belt bulges, and the search on the other side, which begins at its mirror images.
+
+use super::intrinsic::solve;
+use super::search::{fields_at, prolong};
+use super::{Equilibrium, Solved, Start, minimum_from};
+use crate::geometry::Pose;
+use crate::problem::program::{BeltPoint, BeltProgram, NodeSupport, Piece};
+use crate::problem::{Mesh, Problem};
+use crate::scenario::SAME_PLACE;
+use nalgebra::{Matrix3, Vector2, Vector3};
+use stagewise::Distance;
+use std::ops::ControlFlow;
+
+/// Mean distance from the chords along the bulge up to which a belt lies on neither side, in U.
+const NEITHER: f64 = 1e-4;
+/// Share of the mean distance from the chords, in whatever direction, from which the part along the bulge is more than a
+/// by-product of the rest, dimensionless.
+const CLEAR: f64 = 0.2;
+/// Miss of the supports up to which a mirror image meets them, lengths in U and angles in rad.
+const MET: f64 = 1e-6;
+
+impl Equilibrium {
+    /// The side to which the belt bulges: 1 along `solver.bulge`, −1 against it, 0 where it lies on neither side.
+    ///
+    /// It is the sign of the mean distance of the spine, along the bulge, from the straight lines between the places where
+    /// supports hold a position. With fewer than two such places the line is the tangent at that place, or at the start. A
+    /// mean distance within 1e-4 U is 0, and a belt that no support holds has no side.
+    pub fn side(&self) -> i8 {
+        match self.scenario().supports.is_empty() {
+            true => 0,
+            false => side(self.mean_distance().dot(&self.problem.bulge().normalize())),
+        }
+    }
+
+    /// Mean distance of the spine from its chords, in U.
+    fn mean_distance(&self) -> Vector3<f64> {
+        let (scenario, spine) = (self.scenario(), &self.spine);
+        let length = spine.length();
+        let held = scenario.supports.iter().filter(|s| s.position.is_some());
+        let held = held.map(|support| {
+            let at = support.at.arc_length(length) - SAME_PLACE * length;
+            spine.u.partition_point(|u| *u < at)
+        });
+        mean_distance(&spine.u, &spine.pose, &held.collect::<Vec<_>>()) / length
+    }
+}
+
+/// The side of a mean distance along the bulge, in U.
+fn side(distance: f64) -> i8 {
+    match distance.abs() > NEITHER {
+        true => distance.signum() as i8,
+        false => 0,
+    }
+}
+
+/// Mean distance of the spine from its chords between held nodes, square to them; of a belt held at fewer than two nodes, from
+/// the tangent at that node, or at the start. The belt beyond the held nodes does not count.
+///
+/// Shapes: `u` and `poses` one a node; `held` rising.
+fn mean_distance(u: &[f64], poses: &[Pose], held: &[usize]) -> Vector3<f64> {
+    // Twice the integral of the distance from a line through a node.
+    let area = |ends: [usize; 2], node: usize, along: &Vector3<f64>| -> Vector3<f64> {
+        let off = |k: usize| poses[k].position - poses[node].position;
+        let trapezium = |k: usize| (off(k) + off(k + 1)) * (u[k + 1] - u[k]);
+        let area: Vector3<f64> = (ends[0]..ends[1]).map(trapezium).sum();
+        let along = along.try_normalize(f64::EPSILON).unwrap_or_default();
+        area - along * along.dot(&area)
+    };
+    let (area, span) = match held {
+        [first, .., last] => {
+            let chords = held.windows(2).map(|ends| {
+                let along = poses[ends[1]].position - poses[ends[0]].position;
+                area([ends[0], ends[1]], ends[0], &along)
+            });
+            (chords.sum::<Vector3<f64>>(), u[*last] - u[*first])
+        }
+        _ => {
+            let node = held.first().copied().unwrap_or(0);
+            let last = u.len() - 1;
+            let tangent = poses[node].frame.column(1).into_owned();
+            (area([0, last], node, &tangent), u[last])
+        }
+    };
+    0.5 * area / span
+}
+
+/// A minimum that was found from the guess, or one on the side of the bulge if that one lies on the other side: a mirror image
+/// that is a minimum too. Of a belt that bulges clearly between held places also a minimum that a search from
+/// a mirror image finds, and a warning if none is found; elsewhere loads and clamps draw the belt to their side.
+pub(super) fn on_side_of_bulge(
+    mut found: Equilibrium,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Equilibrium {
+    let is_wrong = found.is_minimum() && found.side() < 0;
+    let Some(solved) = found.solved.as_ref().filter(|_| is_wrong) else {
+        return found;
+    };
+    let distance = found.mean_distance();
+    let along_bulge = distance.dot(&found.problem.bulge().normalize()).abs();
+    let is_between = solved.program.half_turns.is_none() && held_nodes(&solved.program).len() > 1;
+    let is_clear = is_between && along_bulge > CLEAR * distance.norm();
+    let images = Image::all(&found.problem, solved);
+    let twins = images.iter().filter(|image| image.is_twin);
+    let twins = twins.map(|image| (image, true));
+    let nearest = images.first().filter(|_| is_clear);
+    let mut iterations = found.iterations;
+    for (image, is_twin) in twins.chain(nearest.map(|image| (image, false))) {
+        let mut other = match is_twin {
+            true => image.twin(&found, solved, proceed),
+            false => image.search(&found.problem, solved, proceed),
+        };
+        iterations += other.iterations;
+        if other.is_minimum() && other.side() > 0 {
+            other.iterations = iterations;
+            return other;
+        }
+    }
+    found.iterations = iterations;
+    if is_clear {
+        let warning =
+            "no minimum was found on the side of solver.bulge: this one lies on the other side";
+        found.warnings.push(warning.to_owned());
+    }
+    found
+}
+
+/// A mirror that takes a belt to a belt: the frames, as columns, from R to Q R S. Q is the mirror of space, S the mirror of
+/// the belt, diag(±1, ±1, ±1), which keeps the spine and may exchange its ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Mirror {
+    /// Sign of the normal.
+    normal: f64,
+    /// Sign of the width direction.
+    across: f64,
+    /// Whether start and end are exchanged.
+    backwards: bool,
+}
+
+impl Mirror {
+    /// All mirrors of an open or a closed belt but the identity. The seam of a closed belt stays where it is.
+    fn all(is_closed: bool) -> impl Iterator<Item = Self> {
+        let signs = [[-1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]];
+        let mirrors = signs.into_iter().chain([[1.0, 1.0]]);
+        let forwards = signs.into_iter().map(|signs| (signs, false));
+        let backwards = mirrors.map(|signs| (signs, true));
+        let all = forwards.chain(backwards.filter(move |_| !is_closed));
+        all.map(|([normal, across], backwards)| Self {
+            normal,
+            across,
+            backwards,
+        })
+    }
+
+    /// Whether left-handed belts become right-handed.
+    fn changes_hand(&self) -> bool {
+        (self.normal * self.across < 0.0) != self.backwards
+    }
+
+    /// The mirror of the belt's frame, S.
+    fn of_frame(&self) -> Matrix3<f64> {
+        let along = if self.backwards { -1.0 } else { 1.0 };
+        Matrix3::from_diagonal(&Vector3::new(self.normal, along, self.across))
+    }
+
+    /// The mirror image of a shape on the same mesh, where supports hold it.
+    fn image(&self, program: &BeltProgram, point: &BeltPoint, bulge: &Vector3<f64>) -> BeltPoint {
+        let nodes = program.nodes();
+        let along = if self.backwards { -1.0 } else { 1.0 };
+        let field = |k: usize| {
+            let fields = match self.backwards {
+                false => point.fields[k],
+                true => {
+                    let is_before_joint =
+                        matches!(program.pieces.get(k), Some(Piece::Joint { .. }));
+                    fields_at(program, &nodes, point, 1.0 - nodes[k], is_before_joint)
+                }
+            };
+            Vector2::new(self.normal * fields[0], along * self.across * fields[1])
+        };
+        let start = if self.backwards { nodes.len() - 1 } else { 0 };
+        let space = self.of_space(program, point, bulge);
+        let mut image = BeltPoint {
+            fields: (0..nodes.len()).map(field).collect(),
+            poses: point.poses.clone(),
+        };
+        image.poses[0].frame = space * point.poses[start].frame * self.of_frame();
+        program.settle(&mut image);
+        place(program, &mut image, point);
+        program.settle(&mut image);
+        image
+    }
+
+    /// The mirror of space, Q: the one that takes a held frame to itself or to the frame held at the place with which it is
+    /// exchanged; without a held frame, the one that turns the bulge round and keeps the chord.
+    fn of_space(
+        &self,
+        program: &BeltProgram,
+        point: &BeltPoint,
+        bulge: &Vector3<f64>,
+    ) -> Matrix3<f64> {
+        let frame = |support: &NodeSupport| {
+            let frame = support.hold.frame()?.to_rotation_matrix().into_inner();
+            Some((support.node, frame))
+        };
+        let Some((node, held)) = program.supports.iter().find_map(frame) else {
+            return self.about_chord(program, point, bulge);
+        };
+        let from = if self.backwards {
+            opposite(program, node)
+        } else {
+            node
+        };
+        let supports = program.supports.iter();
+        let other = supports.filter(|s| s.node == from).find_map(frame);
+        let other = other.map_or(point.poses[from].frame, |(_, other)| other);
+        held * self.of_frame() * other.transpose()
+    }
+
+    /// The mirror of space that turns the bulge round and keeps the chord between the held places, but for its sense.
+    fn about_chord(
+        &self,
+        program: &BeltProgram,
+        point: &BeltPoint,
+        bulge: &Vector3<f64>,
+    ) -> Matrix3<f64> {
+        let held = held_nodes(program);
+        let [from, to] = [held.first(), held.last()].map(|node| *node.unwrap_or(&0));
+        let chord = point.poses[to].position - point.poses[from].position;
+        let tangent = || point.poses[from].frame.column(1).into_owned();
+        let along = chord.try_normalize(f64::EPSILON).unwrap_or_else(tangent);
+        let square = (bulge - along * along.dot(bulge)).normalize();
+        let third = along.cross(&square);
+        let determinant = self.of_frame().determinant();
+        let sense = if self.backwards { -1.0 } else { 1.0 };
+        sense * along * along.transpose()
+            - square * square.transpose()
+            - sense * determinant * third * third.transpose()
+    }
+}
+
+/// The node nearest to the place with which a node's place is exchanged if start and end are.
+fn opposite(program: &BeltProgram, node: usize) -> usize {
+    let nodes = program.nodes();
+    let place = 1.0 - nodes[node];
+    let away = |k: &usize| (nodes[*k] - place).abs();
+    let nearest = (0..nodes.len()).min_by(|a, b| away(a).total_cmp(&away(b)));
+    nearest.unwrap_or(0)
+}
+
+/// The nodes at which supports hold a position, rising.
+fn held_nodes(program: &BeltProgram) -> Vec<usize> {
+    let supports = program.supports.iter();
+    let held = supports.filter(|s| s.position.iter().any(Option::is_some));
+    held.map(|support| support.node).collect()
+}
+
+/// Moves a shape by the mean distance to the places at which supports hold it; along an axis on which none does, to where
+/// another shape is.
+fn place(program: &BeltProgram, shape: &mut BeltPoint, other: &BeltPoint) {
+    for axis in 0..3 {
+        let away = |support: &NodeSupport| {
+            Some(support.position[axis]? - shape.poses[support.node].position[axis])
+        };
+        let away: Vec<f64> = program.supports.iter().filter_map(away).collect();
+        shape.poses[0].position[axis] += match away.len() {
+            0 => other.poses[0].position[axis] - shape.poses[0].position[axis],
+            held => away.iter().sum::<f64>() / held as f64,
+        };
+    }
+}
+
+/// A mirror image on the side of the bulge.
+struct Image {
+    /// Whether start and end are exchanged.
+    is_backwards: bool,
+    shape: BeltPoint,
+    /// Its miss of the supports, lengths in U and angles in rad.
+    miss: f64,
+    /// Whether it meets the supports, and has the energy of its original.
+    is_twin: bool,
+}
+
+impl Image {
+    /// The images of a shape on the side of the bulge: twins first, then those that miss the supports least.
+    fn all(problem: &Problem, solved: &Solved) -> Vec<Self> {
+        /// Relative difference of the energies of mirror images, by rounding and by a mesh that is not symmetric.
+        const LEVEL: f64 = 1e-3;
+        let Solved { program, at, .. } = solved;
+        let bulge = problem.bulge();
+        let (nodes, held) = (program.nodes(), held_nodes(program));
+        let energy = |shape: &BeltPoint| {
+            program.elastic_energy(&shape.fields) + program.load_potential(&shape.poses)
+        };
+        let own = energy(&at.point);
+        let image = |mirror: Mirror| {
+            let shape = mirror.image(program, &at.point, &bulge);
+            let miss = program.miss_of_supports(&shape);
+            let is_level = (energy(&shape) - own).abs() <= LEVEL * own.abs();
+            Self {
+                is_backwards: mirror.backwards,
+                is_twin: miss <= MET && is_level,
+                shape,
+                miss,
+            }
+        };
+        let is_right = |image: &Self| {
+            let distance = mean_distance(&nodes, &image.shape.poses, &held);
+            side(distance.dot(&bulge.normalize())) > 0
+        };
+        let is_twisted = program.half_turns.is_some_and(|half_turns| half_turns != 0);
+        let mirrors = Mirror::all(program.half_turns.is_some());
+        let mirrors = mirrors.filter(|mirror| !(is_twisted && mirror.changes_hand()));
+        let mut images: Vec<_> = mirrors.map(image).filter(is_right).collect();
+        // Rounding must not choose between twins.
+        let rank = |image: &Self| if image.is_twin { 0.0 } else { image.miss };
+        images.sort_by(|a, b| rank(a).total_cmp(&rank(b)));
+        images.dedup_by(|b, a| a.shape.distance(&b.shape) <= MET);
+        images
+    }
+
+    /// The minimum at the image of a minimum.
+    fn twin(
+        &self,
+        original: &Equilibrium,
+        solved: &Solved,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Equilibrium {
+        let problem = &original.problem;
+        let mesh = Mesh::of(problem, &solved.program);
+        let twin = solve(problem, Start::Twin(&mesh, &self.shape), proceed);
+        let refined = twin
+            .refined_for(problem, proceed)
+            .filter(|_| self.is_backwards);
+        let right = |refined: &Equilibrium| refined.side() > 0;
+        refined.filter(right).unwrap_or(twin)
+    }
+
+    /// The minimum that a search from the image finds.
+    fn search(
+        &self,
+        problem: &Problem,
+        solved: &Solved,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Equilibrium {
+        let program = problem.program(problem.elements());
+        let shape = prolong(&solved.program, &self.shape, &program);
+        minimum_from(problem, &shape, proceed)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::{BeltSpec, Component, Place, Scenario, SegmentSpec, SupportSpec};
+
+    /// A belt between parallel clamps, or between pins.
+    fn problem(end: [f64; 3], is_clamped: bool, bulge: [f64; 3]) -> Problem {
+        let mut scenario = Scenario::new(BeltSpec::new(0.1, 1.0, vec![SegmentSpec::straight(1.0)]));
+        let held = |at, position: [f64; 3]| SupportSpec {
+            position: Some(position.map(Component::Held)),
+            rotation: is_clamped.then_some([0.0; 3]),
+            ..SupportSpec::new(at)
+        };
+        scenario.supports = vec![held(Place::Start, [0.0; 3]), held(Place::End, end)];
+        scenario.solver.elements = Some(80);
+        scenario.solver.bulge = bulge;
+        Problem::new(scenario).unwrap()
+    }
+
+    /// The minimum on the side of +x, then that to which a bulge along −x leads from there.
+    fn both_sides(end: [f64; 3], is_clamped: bool) -> [Equilibrium; 2] {
+        let proceed = &mut || ControlFlow::Continue(());
+        let first = solve(
+            &problem(end, is_clamped, [1.0, 0.0, 0.0]),
+            Start::Guess,
+            proceed,
+        );
+        let turned = Equilibrium {
+            problem: problem(end, is_clamped, [-1.0, 0.0, 0.0]),
+            ..first.clone()
+        };
+        assert_eq!((first.side(), turned.side()), (1, -1));
+        let other = on_side_of_bulge(turned, proceed);
+        assert_eq!(other.side(), 1);
+        assert!(other.warnings.is_empty());
+        assert!((other.energy - first.energy).abs() < 1e-8 * first.energy);
+        assert!(
+            other.iterations < first.iterations + 15,
+            "a few Newton steps"
+        );
+        [first, other]
+    }
+
+    /// Largest distance of the nodes from those of the other shape's mirror image.
+    fn distance(
+        [one, other]: &[Equilibrium; 2],
+        image: impl Fn(usize, &[Pose]) -> Vector3<f64>,
+    ) -> f64 {
+        let poses = one.spine.pose.iter().enumerate();
+        let off = poses.map(|(k, pose)| (pose.position - image(k, &other.spine.pose)).norm());
+        off.fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn test_twin_across_a_plane_is_found() {
+        for is_clamped in [true, false] {
+            let found = both_sides([0.0, 0.6, 0.0], is_clamped);
+            let image = |k: usize, poses: &[Pose]| {
+                let [x, y, z] = poses[k].position.into();
+                Vector3::new(-x, y, z)
+            };
+            assert!(distance(&found, image) < 1e-6);
+        }
+    }
+
+    #[test]
+    fn test_twin_that_exchanges_the_ends_is_found() {
+        let end = [0.15, 0.5, 0.0];
+        let found = both_sides(end, true);
+        let image =
+            |k: usize, poses: &[Pose]| Vector3::from(end) - poses[poses.len() - 1 - k].position;
+        assert!(distance(&found, image) < 1e-6);
+    }
+}
