@@ -1,10 +1,10 @@
-"""Random scenarios of 14 kinds that some shape of the belt meets; seeds fixed. `audit_random.py` solves and audits them.
+"""Random scenarios of 14 kinds that some shape of the belt meets; seeds fixed. `audit_random.py` audits them.
 
-Each is read off a random developable shape, and its supports and links hold places of this shape. So every scenario is
-feasible, and a solve that does not converge has failed. The shapes are of two sorts, integrated here without the solver:
+Each is read off a random developable shape, and its supports and links hold places of this shape. So every scenario
+is feasible, and a solve that does not converge has failed. The shapes are of two sorts, integrated without the solver:
 
 - strips, whose bend and rib slope are smooth random functions of the arc length, with square ribs at both ends;
-- rolls, boards with corners that lie on a cylinder of random section, so that their ribs are parallel in the flat board.
+- rolls, boards with corners on a cylinder of random section, so that their ribs are parallel in the flat board.
 """
 
 from __future__ import annotations
@@ -210,8 +210,11 @@ def random_tie(rng: np.random.Generator, strip: Strip) -> Json:
 def random_forces(rng: np.random.Generator, count: int, size: float) -> list[Json]:
     """Dead forces up to a size, at the end or in between, some on a lever."""
     places: list[Any] = ["end" if rng.integers(0, 3) == 0 else float(rng.uniform(0.1, 0.95)) for _ in range(count)]
-    forces = [{"at": place, "force": (rng.normal(0.0, 0.5, 3) * size).tolist()} for place in dict.fromkeys(places)]
-    return [force | ({"lever": rng.normal(0.0, 0.03, 3).tolist()} if rng.integers(0, 3) == 0 else {}) for force in forces]
+    forces: list[Json] = []
+    for place in dict.fromkeys(places):
+        lever: Json = {"lever": rng.normal(0.0, 0.03, 3).tolist()} if rng.integers(0, 3) == 0 else {}
+        forces.append({"at": place, "force": (rng.normal(0.0, 0.5, 3) * size).tolist()} | lever)
+    return forces
 
 
 def weight(rng: np.random.Generator, most: float = 3.0) -> Json:
