@@ -34,6 +34,10 @@ LEAST_ERROR = 3e-5
 """Errors by the mesh that need no estimate."""
 LONGEST_CHORD = 1e-3
 """Excess of an element's chord over its length, by the error of the pose where the bend changes its sign."""
+MOST_TURN = 0.5
+"""Turn of an element, in rad."""
+FRAME = 3e-4
+"""Error of the pose over one element, in rad."""
 STATIONARITY = 5e-3
 """Moments that miss the law of bending, over the largest moment; a mesh of accuracy 1e-3 misses it by less."""
 ACTIVE = 1e-4
@@ -44,11 +48,19 @@ ACTIVE = 1e-4
 
 
 def failures(tables: Json, result: Json) -> list[str]:
-    """What does not hold of a converged result, one line each with the size of the miss over what is allowed."""
+    """What does not hold of a converged result, one line each with the size of the miss over what is allowed.
+
+    What an error by the mesh makes of a claim is allowed in proportion, where the result says that its error is large.
+    """
     shape = Shape(tables, result)
     claims = (geometry, poses, supports, ribs, balance, energy, stationarity)
     misses = [(name, miss / allowed) for claim in claims for name, miss, allowed in claim(shape)]
     return [f"{name}: {ratio:.3g} of what is allowed" for name, ratio in misses if not ratio <= 1.0]
+
+
+def roughness(shape: Shape) -> float:
+    """Error by the mesh that the result states over the one that a scenario asks for by default, and no less than 1."""
+    return max(1.0, *(error / 1e-3 for error in shape.result["error"].values() if error is not None))
 
 
 def geometry(shape: Shape) -> Misses:
@@ -69,9 +81,9 @@ def geometry(shape: Shape) -> Misses:
         yield f"rib to the {side} edge lies on the ruling", off.max(), ROUNDING * shape.board.length
     yield "length", abs(shape.h.sum() - shape.board.length), ROUNDING * shape.board.length
     chord = np.linalg.norm(shape.x[shape.first + 1] - shape.x[shape.first], axis=1)
-    yield "chord against arc", (chord / shape.h).max() - 1.0, LONGEST_CHORD
+    yield "chord against arc", (chord / shape.h).max() - 1.0, LONGEST_CHORD * roughness(shape)
     turn = np.linalg.norm(Rotation.from_matrix(relative(shape)).as_rotvec(), axis=1)
-    yield "turn of an element", turn[~shape.is_rigid].max(), 0.5
+    yield "turn of an element", turn[~shape.is_rigid].max(), MOST_TURN * roughness(shape)
     joint = np.flatnonzero(np.diff(shape.u) <= SAME_PLACE * shape.board.length)
     for k in joint:
         turned = Rotation.from_rotvec([shape.board.corner_at(shape.u[k]), 0.0, 0.0]).as_matrix()
@@ -92,7 +104,7 @@ def poses(shape: Shape) -> Misses:
     length = shape.board.length
     allowed = max(LEAST_ERROR, HONESTY * (shape.result["error"]["position"] or 1e-3))
     off_x, off_frame = x[:, -1] - shape.x[shape.first + 1], frames[:, -1] - shape.frame[shape.first + 1]
-    yield "frame over an element", np.abs(off_frame).max(), 3e-4
+    yield "frame over an element", np.abs(off_frame).max(), FRAME * roughness(shape)
     # A turn e of the frame after an element and a shift of its end move all that follows.
     turns = np.einsum("mij,mkj->mik", frames[:, -1], shape.frame[shape.first + 1])
     axial = Rotation.from_matrix(turns).as_rotvec()
@@ -224,7 +236,7 @@ def stationarity(shape: Shape) -> Misses:
     fold_seam(shape, bend_rest, slope_rest, span)
     free = span > 0.0
     worst = np.abs(bend_rest[free] / span[free]).max()
-    yield "law of bending", worst, STATIONARITY * moment
+    yield "law of bending", worst, STATIONARITY * roughness(shape) * moment
     if not np.isfinite(slope_rest).all():
         yield "law of ribs", np.nan, 1.0
         return
@@ -268,7 +280,7 @@ def pressing_ribs(shape: Shape, rest: Array, moment: float) -> Misses:
     else:
         miss = np.linalg.norm(left)
     scale = moment * max(np.abs(shape.bend).max() * shape.board.width, 1e-3)
-    yield "law of ribs", miss, STATIONARITY * scale
+    yield "law of ribs", miss, STATIONARITY * roughness(shape) * scale
 
 
 def is_held(shape: Shape) -> npt.NDArray[np.bool_]:

@@ -108,7 +108,10 @@ HEADER = [
 
 
 def main() -> None:
-    """One record a scenario, one line a failure, and the table where all scenarios were solved."""
+    """One record a scenario, one line a failure, and the table where all scenarios were solved.
+
+    Records that the file has already are kept: a run that was interrupted goes on.
+    """
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--kinds", nargs="+", choices=list(KINDS), default=list(KINDS))
     parser.add_argument("--count", type=int, default=TOTAL)
@@ -117,17 +120,21 @@ def main() -> None:
     arguments = parser.parse_args()
     arguments.out.parent.mkdir(parents=True, exist_ok=True)
     records: list[Json] = []
-    with arguments.out.open("w", encoding="utf-8") as file:
+    if arguments.out.exists():
+        records = [json.loads(line) for line in arguments.out.read_text(encoding="utf-8").splitlines()]
+    done = {(record["kind"], record["index"]) for record in records}
+    with arguments.out.open("a", encoding="utf-8") as file:
         for number in range(arguments.count):
-            index, kind = divmod(number, len(KINDS))
-            if list(KINDS)[kind] not in arguments.kinds:
+            index, at = divmod(number, len(KINDS))
+            kind = list(KINDS)[at]
+            if kind not in arguments.kinds or (kind, index) in done:
                 continue
-            record = audited(list(KINDS)[kind], index, arguments.seed)
+            record = audited(kind, index, arguments.seed)
             records.append(record)
             file.write(json.dumps(record) + "\n")
             file.flush()
             if record["status"] != "converged" or record["failures"]:
-                print(record["kind"], index, record["status"], record["message"], record.get("failures"), flush=True)
+                print(kind, index, record["status"], record["message"], record.get("failures"), flush=True)
     rows = [[kind, *row([record for record in records if record["kind"] == kind])] for kind in arguments.kinds]
     rows.append(["all", *row(records)])
     print(tables.table(HEADER, rows))
