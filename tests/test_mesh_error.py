@@ -137,6 +137,20 @@ def test_tape_under_its_own_weight_hangs_as_a_catenary() -> None:
     assert found.stable is True
 
 
+@pytest.mark.parametrize("slack", [1e-3, 1e-4, 1e-5])
+@pytest.mark.parametrize("rigidity", [1e-5, 1e-7, 1e-9])
+def test_nearly_taut_belt_hangs_as_a_catenary(slack: float, rigidity: float) -> None:
+    """A belt of weight 1 pinned at its ends; the rest is what bending adds, R_f/(T U²) and less."""
+    half = brentq(lambda x: np.sinh(x) / x - 1.0 / (1.0 - slack), 1e-3, 1.0, xtol=1e-15)
+    a = 0.5 * (1.0 - slack) / half
+    tables = scenario(pins(1.0 - slack), loads={"gravity": [-1.0, 0.0, 0.0]}, solver={"bulge": [-1.0, 0.0, 0.0]})
+    tables["belt"] |= {"rigidity": rigidity, "density": 1.0, "width": 0.02}
+    found = solve(tables)
+    assert found.u.size < 500
+    assert -found.position[:, 0].min() == pytest.approx(a * (np.cosh(half) - 1.0), rel=3e-4)
+    assert found.reaction("end").force[1] == pytest.approx(a, rel=1e-4)
+
+
 @pytest.mark.parametrize("lean", [0.3, math.pi / 3, 2.0])
 @pytest.mark.parametrize("pull", [1e3, 1e5])
 def test_leaning_clamp_under_tension_bends_as_the_elastica(lean: float, pull: float) -> None:
@@ -165,7 +179,10 @@ def test_slender_belts_tend_to_a_limit() -> None:
 
 
 def test_ends_drawn_past_each_other_are_carried_or_refused() -> None:
-    for distance in (-0.9, -0.95):
+    for distance, energy in ((-0.9, 550.80), (-0.95, 1161.26)):
+        found = solve(scenario(clamps([0.0, distance, 0.0], CLAMP)))
+        assert found.energy == pytest.approx(energy, rel=1e-3)
+    for distance in (-0.97, -0.99):
         found = fb.solve(fb.Scenario.from_dict(scenario(clamps([0.0, distance, 0.0], CLAMP))))
         turns = np.einsum("kij,kij->k", found.frame[:-1], found.frame[1:])
         assert found.status != "converged" or np.arccos(0.5 * (turns.min() - 1.0)) <= 0.5

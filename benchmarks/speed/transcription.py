@@ -81,7 +81,8 @@ def element(energy: Energy, length: float, width: float, fields: Any) -> tuple[A
     bracket = 3.0**0.5 / 12.0 * length**2
     along = ca.DM([0.0, 1.0, 0.0])
     turn = 0.5 * length * (first + second) + bracket * ca.cross(first, second)
-    way = length * along + bracket * ca.cross(first - second, along)
+    shortening = (length**3 / 80.0) * (bends[1] - bends[0]) ** 2
+    way = (length - shortening) * along + bracket * ca.cross(first - second, along)
     square = ca.dot(turn, turn)
     once = ca.cross(turn, way)
     displacement = way + _series(square, 2) * once + _series(square, 3) * ca.cross(turn, once)

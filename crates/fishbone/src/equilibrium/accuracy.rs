@@ -4,6 +4,7 @@ use super::guess::inside;
 use super::search::{Search, prolong_inequalities, prolonged};
 use crate::problem::program::{BeltPoint, BeltProgram, Piece};
 use crate::problem::{Mesh, Problem};
+use crate::scenario::SAME_PLACE;
 use crate::strip::spine::Spine;
 use crate::surface::least_spine_radius;
 use nalgebra::Vector3;
@@ -76,7 +77,11 @@ pub(super) struct Estimate {
 }
 
 impl Estimate {
-    /// The estimate for a solution of a problem's programme; `None` where the finer mesh has no solution next to it.
+    /// Change from which one Newton step tells no more than that the error is large, relative.
+    pub(super) const WILD: f64 = 0.02;
+
+    /// The estimate for a solution of a problem's programme; `None` where the finer mesh has no solution next to it. Where one
+    /// Newton step changes a quantity by more than `most`, relative, the equilibrium of the finer mesh is searched instead.
     ///
     /// The error of a quantity that converges with the square of the length of elements is 4/3 of its change on halving
     /// them, and nearer to the change itself of one that converges faster.
@@ -85,11 +90,11 @@ impl Estimate {
         program: &BeltProgram,
         at: &Stationary<BeltPoint>,
         values: &Values,
+        most: f64,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Option<Self> {
         /// Error over its change on halving all elements, dimensionless.
         const OVER_CHANGE: f64 = 1.2;
-        /// Change from which one Newton step tells nothing, dimensionless.
-        const WILD: f64 = 0.02;
         let fine = problem.program_on(&Mesh::of(problem, program).halved())?;
         let inequalities = &at.multipliers.inequalities;
         let point = prolonged(program, &at.point, &fine);
@@ -115,8 +120,8 @@ impl Estimate {
         let step = stagewise::correct(&fine, problem.tolerance(), near.clone())?;
         let mut better = (step.point, step.equalities, step.objective);
         let mut error = own.off_on(problem, &fine, &better);
-        if (ribs_meet || error.largest() > WILD)
-            && let Some(solution) = solved_near(problem, &fine, &near)
+        if (ribs_meet || error.largest() > most)
+            && let Some(solution) = solved_near(problem, &fine, &near, proceed)
         {
             let Stationary { point, multipliers } = solution.at;
             better = (point, multipliers.equalities, solution.values.objective);
@@ -153,11 +158,11 @@ fn solved_near(
     problem: &Problem,
     program: &BeltProgram,
     near: &Stationary<BeltPoint>,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Option<Solution<BeltPoint>> {
     stagewise::settle(program, problem.tolerance(), near.clone()).or_else(|| {
         let search = Search::of(problem);
         let barrier = search.settings.warm_barrier;
-        let proceed = &mut || ControlFlow::Continue(());
         let found = search.only_from(program, near.point.clone(), barrier, proceed);
         (found.outcome == Outcome::Converged).then_some(found)
     })
@@ -215,12 +220,14 @@ impl Quantities {
         self.off(&Self::of(problem, program, point, equalities, *objective))
     }
 
-    /// By how much these are off better ones, relative.
+    /// By how much these are off better ones on a mesh that has all their nodes, relative.
     fn off(&self, better: &Self) -> MeshError {
+        let same = SAME_PLACE * self.spine.length();
+        let mut there = better.spine.u.iter().zip(&better.spine.pose);
         let nodes = self.spine.u.iter().zip(&self.spine.pose);
-        let moves = nodes.map(|(u, pose)| {
-            let there = better.spine.at(*u).pose.position;
-            (there - pose.position).norm()
+        let moves = nodes.map(|(u, pose)| match there.find(|(at, _)| **at >= u - same) {
+            Some((_, better)) => (better.position - pose.position).norm(),
+            None => f64::NAN,
         });
         let largest = |forces: &[Vector3<f64>]| forces.iter().map(|f| f.norm()).fold(0.0, f64::max);
         let pairs = self.forces.iter().zip(&better.forces);

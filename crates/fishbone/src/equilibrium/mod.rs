@@ -158,8 +158,14 @@ impl Equilibrium {
     pub fn error(&self) -> Option<MeshError> {
         *self.error.get_or_init(|| {
             let solved = self.certified().ok()?;
-            let estimate =
-                Estimate::new(&self.problem, &solved.program, &solved.at, &solved.values);
+            let estimate = Estimate::new(
+                &self.problem,
+                &solved.program,
+                &solved.at,
+                &solved.values,
+                Estimate::WILD,
+                &mut || ControlFlow::Continue(()),
+            );
             Some(estimate?.error)
         })
     }

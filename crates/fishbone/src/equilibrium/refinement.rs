@@ -60,10 +60,16 @@ pub(super) fn refine(
             Some(best) => best.on_finer(problem, search, program, proceed),
             None => {
                 let barrier = search.settings.cold_barrier;
-                Level::on(problem, search, program, start, barrier, proceed)
+                let search = if start.is_none() {
+                    rough(search)
+                } else {
+                    *search
+                };
+                Level::on(problem, &search, program, start, barrier, proceed)
             }
         };
-        level.estimate(problem);
+        // A long step tells where the mesh has to be finer, and no more is asked here.
+        level.estimate(problem, f64::INFINITY, proceed);
         iterations += level.solution.iterations;
         level.solution.iterations = iterations;
         if level.solution.outcome == Outcome::Interrupted || level.is_accurate(problem.accuracy()) {
@@ -81,7 +87,18 @@ pub(super) fn refine(
     }
     let mut best = best.expect("the first mesh has a programme");
     best.solution.iterations = iterations;
+    best.estimate(problem, Estimate::WILD, proceed);
     best
+}
+
+/// A search for a minimum that is only a start.
+fn rough(search: &Search) -> Search {
+    /// Residual of such a minimum, lengths in U and energy in mean R_f/U.
+    const ROUGH: f64 = 1e-3;
+    Search {
+        tolerance: search.tolerance.max(ROUGH),
+        ..*search
+    }
 }
 
 /// The minimum of an easier problem and the mesh for the problem itself; without an easier one, its first mesh alone.
@@ -90,12 +107,7 @@ fn first_level(
     search: &Search,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> (Option<Level>, Mesh) {
-    /// Residual of a minimum that is only a start, lengths in U and energy in mean R_f/U.
-    const ROUGH: f64 = 1e-4;
-    let rough = Search {
-        tolerance: search.tolerance.max(ROUGH),
-        ..*search
-    };
+    let rough = rough(search);
     let mesh = first_mesh(problem);
     if let Some(level) = loaded(problem, &rough, &mesh, proceed) {
         return (Some(level), mesh);
@@ -166,19 +178,11 @@ fn first_mesh(problem: &Problem) -> Mesh {
     const SHARE: f64 = 0.5;
     let program = problem.program(FIRST);
     let tension = program.total_load();
-    let breaks = problem.break_points();
-    let nodes = program.nodes();
-    let is_break = |node: f64| breaks.iter().any(|at| (node - at).abs() < SAME_PLACE);
-    let lengths: Vec<f64> = program
-        .elements()
-        .map(
-            |(k, element)| match is_break(nodes[k]) || is_break(nodes[k + 1]) {
-                true => element.length.min(SHARE / tension.sqrt()),
-                false => element.length,
-            },
-        )
-        .collect();
-    Mesh::uniform(problem, FIRST).graded(problem, &lengths)
+    let layer = SHARE / tension.sqrt();
+    let places = problem.break_points().into_iter().map(|at| [at, layer]);
+    let lengths: Vec<f64> = program.elements().map(|(_, e)| e.length).collect();
+    let places: Vec<_> = places.collect();
+    Mesh::uniform(problem, FIRST).graded(problem, &lengths, &places)
 }
 
 /// Width of the belt that is solved first, over the belt's own; 1 of a belt that is not slender.
@@ -284,11 +288,17 @@ impl Level {
         }
     }
 
-    /// Estimates the error of a solution that has converged.
-    pub(super) fn estimate(&mut self, problem: &Problem) {
+    /// Estimates the error of a solution that has converged. Where one Newton step changes a quantity by more than `most`,
+    /// relative, the equilibrium of a finer mesh is searched for it.
+    pub(super) fn estimate(
+        &mut self,
+        problem: &Problem,
+        most: f64,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) {
         if self.has_converged() {
             let (at, values) = (&self.solution.at, &self.solution.values);
-            self.estimate = Estimate::new(problem, &self.program, at, values);
+            self.estimate = Estimate::new(problem, &self.program, at, values, most, proceed);
         }
     }
 
@@ -316,7 +326,7 @@ impl Level {
     /// Whether a finer mesh has much the same solution.
     fn is_confirmed(&self) -> bool {
         let estimate = self.estimate.as_ref();
-        estimate.is_some_and(|estimate| estimate.error.largest() <= LARGE)
+        estimate.is_some_and(|estimate| estimate.error.largest() <= Estimate::WILD)
     }
 
     /// Whether the solution is an equilibrium of a belt.
@@ -382,7 +392,7 @@ impl Level {
                 false => element.length.max(LONGEST),
             })
             .collect();
-        Mesh::of(problem, &self.program).graded(problem, &lengths)
+        Mesh::of(problem, &self.program).graded(problem, &lengths, &[])
     }
 
     /// A mesh on which the error should be within the accuracy. A belt that may slide along itself has no place on a graded
@@ -391,7 +401,7 @@ impl Level {
         let mesh = Mesh::of(problem, &self.program);
         match &self.estimate {
             Some(estimate) if self.is_sound() && !problem.is_left_alone() => {
-                mesh.graded(problem, &self.lengths(estimate, problem.accuracy()))
+                mesh.graded(problem, &self.lengths(estimate, problem.accuracy()), &[])
             }
             _ => mesh.halved(),
         }

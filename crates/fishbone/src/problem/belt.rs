@@ -70,7 +70,7 @@ impl Division {
     }
 
     /// Every element's start and length, in shares.
-    fn places(&self) -> impl Iterator<Item = [f64; 2]> {
+    pub(crate) fn places(&self) -> impl Iterator<Item = [f64; 2]> {
         self.0.iter().scan(0.0, |start, share| {
             let from = *start;
             *start += share;

@@ -43,22 +43,27 @@ impl Mesh {
         }
     }
 
-    /// The mesh whose elements have about the given lengths where the elements of this one are, in U; no element is much
-    /// longer than its neighbours.
+    /// The mesh whose elements have about the given lengths where the elements of this one are, and shorter ones about given
+    /// places: lengths grow slowly along the belt, within an element of this mesh, too.
     ///
-    /// Shapes: `lengths` one an element.
-    pub(crate) fn graded(&self, problem: &Problem, lengths: &[f64]) -> Self {
+    /// Shapes: `lengths` one an element, `places` any number of arc lengths, each with the length of elements there.
+    ///
+    /// Units: U
+    pub(crate) fn graded(&self, problem: &Problem, lengths: &[f64], places: &[[f64; 2]]) -> Self {
         let wholes = problem.lengths_of_stretches();
-        let own = self.divisions.iter().zip(&wholes);
-        let own: Vec<f64> = own
-            .flat_map(|(division, whole)| division.0.iter().map(move |share| share * whole))
-            .collect();
-        let smooth = smoothed(&own, lengths);
-        let mut from = 0;
+        let mut own = Vec::with_capacity(lengths.len());
+        let mut start = 0.0;
+        for (division, whole) in self.divisions.iter().zip(&wholes) {
+            own.extend(division.places().map(|[from, share]| {
+                let [from, to] = [from, from + share].map(|share| start + share * whole);
+                [from, to]
+            }));
+            start += whole;
+        }
+        let mut ramps = ramps(&own, lengths, places).into_iter();
         let graded = self.divisions.iter().zip(&wholes).map(|(division, whole)| {
-            let of_stretch = from..from + division.0.len();
-            from = of_stretch.end;
-            redivided(division, *whole, &smooth[of_stretch])
+            let of_stretch: Vec<_> = ramps.by_ref().take(division.0.len()).flatten().collect();
+            divided(&of_stretch, *whole)
         });
         Self {
             divisions: graded.collect(),
@@ -72,48 +77,107 @@ impl Mesh {
     }
 }
 
-/// Lengths at most as long as given that grow by no more than a share of the way along the belt.
-fn smoothed(own: &[f64], lengths: &[f64]) -> Vec<f64> {
-    /// Growth of the length of elements along the belt, dimensionless.
-    const GROWTH: f64 = 0.3;
-    let mut smooth = lengths.to_vec();
-    let mut limit = |k: usize, beside: usize| {
-        let way = 0.5 * (own[k] + own[beside]);
-        smooth[k] = smooth[k].min(smooth[beside] + GROWTH * way);
-    };
-    (1..own.len()).for_each(|k| limit(k, k - 1));
-    (1..own.len()).rev().for_each(|k| limit(k - 1, k));
-    smooth
+/// A part of the belt along which the length of elements grows evenly, or not at all.
+#[derive(Debug, Clone, Copy)]
+struct Ramp {
+    /// Length of the part.
+    length: f64,
+    /// Length of elements at its start.
+    from: f64,
+    /// Growth of the length of elements along it, dimensionless.
+    growth: f64,
 }
 
-/// A stretch divided anew, into elements of about the given lengths where its elements are.
-fn redivided(division: &Division, whole: f64, lengths: &[f64]) -> Division {
-    if division.0.is_empty() {
-        return division.clone();
+impl Ramp {
+    /// Number of elements on it, ∫ du / (a + g u).
+    fn count(&self) -> f64 {
+        match self.growth == 0.0 {
+            true => self.length / self.from,
+            false => (self.growth * self.length / self.from).ln_1p() / self.growth,
+        }
     }
+
+    /// The place at which as many elements end, from its start.
+    fn place(&self, count: f64) -> f64 {
+        match self.growth == 0.0 {
+            true => count * self.from,
+            false => self.from * (self.growth * count).exp_m1() / self.growth,
+        }
+    }
+}
+
+/// Lengths of elements at most as long as given in each element and at places, that grow by no more than a share of the way
+/// along the belt: up from the start of an element, even, and down to its end.
+fn ramps(own: &[[f64; 2]], lengths: &[f64], places: &[[f64; 2]]) -> Vec<[Ramp; 3]> {
+    /// Growth of the length of elements along the belt, dimensionless.
+    const GROWTH: f64 = 0.3;
+    let about = |at: f64, length: f64| {
+        let by_places = places.iter();
+        let by_places = by_places.map(|[place, there]| there + GROWTH * (place - at).abs());
+        [at, by_places.fold(length, f64::min)]
+    };
+    let ends = own.iter().zip(lengths);
+    let mut ends: Vec<[f64; 2]> = ends
+        .flat_map(|(ends, length)| ends.map(|at| about(at, *length)))
+        .collect();
+    let mut limit = |k: usize, beside: usize| {
+        let way = (ends[k][0] - ends[beside][0]).abs();
+        ends[k][1] = ends[k][1].min(ends[beside][1] + GROWTH * way);
+    };
+    (1..2 * own.len()).for_each(|k| limit(k, k - 1));
+    (1..2 * own.len()).rev().for_each(|k| limit(k - 1, k));
+    let pairs = ends.chunks(2).zip(lengths);
+    pairs
+        .map(|(pair, most)| {
+            let ([start, first], [end, last]) = (pair[0], pair[1]);
+            let whole = end - start;
+            let top = (0.5 * (first + last + GROWTH * whole)).min(*most);
+            let up = ((top - first) / GROWTH).clamp(0.0, whole);
+            let down = ((top - last) / GROWTH).clamp(0.0, whole - up);
+            [
+                (up, first, GROWTH),
+                (whole - up - down, top, 0.0),
+                (down, top, -GROWTH),
+            ]
+            .map(|(length, from, growth)| Ramp {
+                length,
+                from,
+                growth,
+            })
+        })
+        .collect()
+}
+
+/// A stretch divided into elements of about the lengths that ramps say; a stiffened stretch has none.
+fn divided(ramps: &[Ramp], whole: f64) -> Division {
     /// Rounding error of a number of elements.
     const ROUNDING: f64 = 1e-9;
-    let counts = division.0.iter().zip(lengths);
-    let counts: Vec<f64> = counts
-        .map(|(share, length)| share * whole / length)
-        .collect();
-    let due: f64 = counts.iter().sum();
+    let due: f64 = ramps.iter().map(Ramp::count).sum();
+    if ramps.is_empty() {
+        return Division(Vec::new());
+    }
     let elements = ((due - ROUNDING).ceil() as usize).max(1);
     let mut places = Vec::with_capacity(elements + 1);
     let (mut start, mut done) = (0.0, 0.0);
-    for (share, count) in division.0.iter().zip(&counts) {
+    for ramp in ramps {
+        let count = ramp.count();
         while places.len() < elements {
             let next = places.len() as f64 * due / elements as f64;
             if next > done + count {
                 break;
             }
-            places.push(start + share * ((next - done) / count));
+            places.push(start + ramp.place(next - done));
         }
-        start += share;
+        start += ramp.length;
         done += count;
     }
-    places.push(start);
-    Division(places.windows(2).map(|ends| ends[1] - ends[0]).collect())
+    places.push(whole);
+    Division(
+        places
+            .windows(2)
+            .map(|ends| (ends[1] - ends[0]) / whole)
+            .collect(),
+    )
 }
 
 impl Problem {
@@ -186,13 +250,50 @@ mod tests {
         let mesh = Mesh::uniform(&problem, 40);
         let mut asked = lengths(&problem, &mesh);
         asked[20] = 0.001;
-        let graded = lengths(&problem, &mesh.graded(&problem, &asked));
+        let graded = lengths(&problem, &mesh.graded(&problem, &asked, &[]));
         let total: f64 = graded.iter().sum();
         assert!((total - 3.5 / 4.0).abs() < 1e-12);
         let shortest = graded.iter().copied().fold(f64::INFINITY, f64::min);
         assert!((0.0009..=0.001).contains(&shortest), "{shortest}");
         assert!(graded.iter().all(|length| *length <= 0.025 + 1e-12));
         assert!(graded.len() > 60);
+    }
+
+    #[test]
+    fn test_graded_mesh_is_short_about_a_place_within_an_element() {
+        let problem = problem();
+        let mesh = Mesh::uniform(&problem, 40);
+        let asked = lengths(&problem, &mesh);
+        let graded = lengths(&problem, &mesh.graded(&problem, &asked, &[[0.0, 1e-5]]));
+        assert!((0.9e-5..1.2e-5).contains(&graded[0]), "{}", graded[0]);
+        let total: f64 = graded.iter().sum();
+        assert!((total - 3.5 / 4.0).abs() < 1e-12);
+        // From 1e-5 to 1/40, each longer by less than a half than the one before: ln(2500)/0.3 elements.
+        assert!(
+            graded
+                .windows(2)
+                .take(25)
+                .all(|pair| pair[1] < 1.5 * pair[0])
+        );
+        assert!((55..70).contains(&graded.len()), "{}", graded.len());
+    }
+
+    #[test]
+    fn test_ramps_count_as_many_elements_as_they_place() {
+        for growth in [-0.3, 0.0, 0.3] {
+            let ramp = Ramp {
+                length: 0.4,
+                from: 0.2,
+                growth,
+            };
+            let steps = 100_000;
+            let sum: f64 = (0..steps)
+                .map(|i| (f64::from(i) + 0.5) / f64::from(steps) * ramp.length)
+                .map(|u| ramp.length / f64::from(steps) / (ramp.from + growth * u))
+                .sum();
+            assert!((ramp.count() - sum).abs() < 1e-8);
+            assert!((ramp.place(ramp.count()) - ramp.length).abs() < 1e-14);
+        }
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::density::{self, Density, LANES, Loaded, between, element_energy};
 use super::element::Element;
-use crate::geometry::{Pose, gauss_points};
+use crate::geometry::{Pose, SHORTENING, gauss_points};
 use nalgebra::{Matrix3, SVector, Vector3, Vector6};
 use num_dual::{Dual64, DualNum, HyperDual64};
 use stagewise::{Stage, StageMatrix};
@@ -218,7 +218,9 @@ where
     let phi: Triple<T> =
         std::array::from_fn(|i| (a[i] + b[i]) * (0.5 * h) + commutator[i] * weight);
     // Commutator of the rates with the translation along η.
-    let rho = [(b[2] - a[2]) * weight, T::from(h), (a[0] - b[0]) * weight];
+    let rise = b[2] - a[2];
+    let along = rise * rise * (-SHORTENING * h * h * h) + h;
+    let rho = [rise * weight, along, (a[0] - b[0]) * weight];
     let square = phi[0] * phi[0] + phi[1] * phi[1] + phi[2] * phi[2];
     let [sine, cosine, cubic] = [0, 1, 2].map(|order| even_series(square, order));
     let once = cross(phi, rho);

@@ -10,6 +10,12 @@ pub(crate) const ACTIVE: usize = 3;
 /// edge.
 pub(crate) const BOUNDS: usize = 2 + ACTIVE;
 
+/// Largest share |s| V/2 of the convergence at which ribs meet at the edge of their own stretch, dimensionless.
+///
+/// Where ribs meet, `wunderlich` has no bound, and rounding of the slopes decides its slope. This share keeps it smooth
+/// to the digits of a slope, and costs 1e-6 of the width.
+const CLOSEST: f64 = 1.0 - 1e-6;
+
 /// The active edges of an element: edges of the board, other than its own stretch's two, that bound its ribs.
 pub(crate) type ActiveEdges<W = f64> = [Option<Edge<W>>; ACTIVE];
 
@@ -92,7 +98,7 @@ pub(crate) struct RibBounds<'a, W = f64> {
 
 impl<'a, W: DualNum<Primitive = f64> + Copy> RibBounds<'a, W> {
     /// Slacks of the ribs against crossing on the board, by slopes at both ends of the element; admissible where positive:
-    /// `1 − s v` at the +ζ and at the −ζ edge of the stretch, then [`Edge::slack`] at the active edges, 1 where there are
+    /// 1e-6 less than `1 − s v` at the +ζ and at the −ζ edge of the stretch, then [`Edge::slack`] at the active edges, 1 where there are
     /// none.
     ///
     /// On an arc v is where the rib meets the inner edge; towards the outer one, which a rib meets before V/2, it is V/2
@@ -114,7 +120,7 @@ impl<'a, W: DualNum<Primitive = f64> + Copy> RibBounds<'a, W> {
             Some(edge) => edge.slack(mean, s),
         };
         let [a, b, c] = self.edges.each_ref().map(active);
-        [-s * plus + 1.0, -s * minus + 1.0, a, b, c]
+        [-s * plus + CLOSEST, -s * minus + CLOSEST, a, b, c]
     }
 
     /// Indices in [`Self::slacks`] of the element's inequalities.
@@ -136,7 +142,7 @@ impl RibBounds<'_> {
             let rate = self.strips.half_width / self.strips.length;
             let y = rate * (slopes[1] - slopes[0]);
             let [plus, minus] =
-                [-1.0, 1.0].map(|sign| SlopeJet::of_share(rate, [1.0 + sign * y, sign, 0.0]));
+                [-1.0, 1.0].map(|sign| SlopeJet::of_share(rate, [CLOSEST + sign * y, sign, 0.0]));
             let none = SlopeJet::constant(1.0);
             return [plus, minus, none, none, none];
         }

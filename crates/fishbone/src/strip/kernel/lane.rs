@@ -4,11 +4,11 @@ use super::arithmetic::{
     cross, dot, entry, four, in_world, minus, plus, seen_from, three, triple, upper,
 };
 use super::{Input, Lanes, Output, Spans, Triple, Upper};
-use crate::geometry::gauss_points;
+use crate::geometry::{SHORTENING, gauss_points};
 use crate::strip::developable::{EnergyModel, Term};
 
-/// The Magnus step of an element, with the parts of its derivatives: the fields at the Gauss points, the weights of the sum
-/// and of the commutator.
+/// The Magnus step of an element, with the parts of its derivatives: the fields at the Gauss points, the weights of the sum,
+/// of the commutator and of the chord's shortening.
 #[derive(Clone, Copy)]
 pub(super) struct Magnus {
     pub(super) rotation: Triple,
@@ -18,6 +18,7 @@ pub(super) struct Magnus {
     geodesic: f64,
     half: f64,
     weight: f64,
+    shortening: f64,
 }
 
 impl Magnus {
@@ -34,6 +35,7 @@ impl Magnus {
         let slope = [more * s0 + less * s1, less * s0 + more * s1];
         let (h, geodesic) = (spans.length[lane], spans.geodesic[lane]);
         let (half, weight) = (0.5 * h, COMMUTATOR * h * h);
+        let (rise, shortening) = (bend[1] - bend[0], SHORTENING * h * h * h);
         let [torsion_1, torsion_2] = [-slope[0] * bend[0], -slope[1] * bend[1]];
         Self {
             rotation: [
@@ -41,12 +43,13 @@ impl Magnus {
                 half * (torsion_1 + torsion_2) + weight * geodesic * (bend[0] - bend[1]),
                 half * (bend[0] + bend[1]) + weight * geodesic * (torsion_2 - torsion_1),
             ],
-            translation: [weight * (bend[1] - bend[0]), h, 0.0],
+            translation: [weight * rise, h - shortening * rise * rise, 0.0],
             bend,
             slope,
             geodesic,
             half,
             weight,
+            shortening,
         }
     }
 
@@ -71,10 +74,18 @@ impl Magnus {
         ]
     }
 
-    /// Derivatives of the translation, which is along ξ, by (bend, slope) at the first Gauss point, then at the second.
+    /// Derivative of the translation by the bend at the second Gauss point; that by the bend at the first is the opposite,
+    /// and slopes do not change it.
     #[inline(always)]
-    fn translation_by_gauss(&self) -> [f64; 4] {
-        [-self.weight, 0.0, self.weight, 0.0]
+    fn translation_by_rise(&self) -> Triple {
+        let rise = self.bend[1] - self.bend[0];
+        [self.weight, -2.0 * self.shortening * rise, 0.0]
+    }
+
+    /// Second derivative along η of the translation by the bend at the second Gauss point.
+    #[inline(always)]
+    fn translation_by_rise_twice(&self) -> f64 {
+        -2.0 * self.shortening
     }
 
     /// Second derivatives of `by_rotation · rotation`.
@@ -103,6 +114,9 @@ impl Magnus {
 
 /// Weight √3/12 of the commutator in the Magnus step, per square of the step's length, dimensionless.
 const COMMUTATOR: f64 = 0.144_337_567_297_406_43;
+
+/// Derivative of the rise of the bend, between the Gauss points, by (bend, slope) at the first, then at the second.
+const RISE_BY_GAUSS: [f64; 4] = [-1.0, 0.0, 1.0, 0.0];
 
 /// Derivatives of one lane, from the even functions of its rotation.
 #[inline(always)]
@@ -247,13 +261,10 @@ impl Twists {
         let twice = cross(phi, once);
         let lead = three(|i| 2.0 * (cosine[1] * once[i] + cubic[1] * twice[i] - cubic[0] * rho[i]));
         let across = cubic[0] * dot(phi, rho);
-        let by_shift = [
-            plain + cubic[0] * phi[0] * phi[0],
-            cosine[0] * phi[2] + cubic[0] * phi[0] * phi[1],
-            cubic[0] * phi[0] * phi[2] - cosine[0] * phi[1],
-        ];
+        let shift = step.translation_by_rise();
+        let (turned, along_shift) = (cross(phi, shift), cubic[0] * dot(phi, shift));
+        let by_rise = three(|i| plain * shift[i] + cosine[0] * turned[i] + along_shift * phi[i]);
         let steps = step.rotation_by_gauss();
-        let shifts = step.translation_by_gauss();
         let along = four(|j| dot(phi, steps[j]));
         let along_translation = four(|j| dot(rho, steps[j]));
         let rotation = four(|j| {
@@ -267,7 +278,7 @@ impl Twists {
                     + cosine[0] * turned[i]
                     + across * steps[j][i]
                     + cubic[0] * along_translation[j] * phi[i]
-                    + by_shift[i] * shifts[j]
+                    + by_rise[i] * RISE_BY_GAUSS[j]
             })
         });
         Self {
@@ -309,20 +320,25 @@ fn work(
             - cosine[1] * once[i]
             - 0.5 * cubic[0] * moment[i]
     });
-    // Second derivatives by the translation along ξ and the rotation φ.
+    // Second derivatives by the rise, of which only the translation depends, and the rotation φ.
+    let shift = step.translation_by_rise();
     let force_once = cross(phi, force);
     let force_twice = cross(phi, force_once);
-    let lead = 2.0 * (cubic[1] * force_twice[0] - cosine[1] * force_once[0] - cubic[0] * force[0]);
+    let lead = 2.0
+        * (cubic[1] * dot(force_twice, shift)
+            - cosine[1] * dot(force_once, shift)
+            - cubic[0] * dot(force, shift));
+    let (arm, along_shift) = (cross(shift, force), dot(phi, shift));
     let steps = &twists.step;
-    let shifts = step.translation_by_gauss();
     let along_force = four(|j| dot(force, steps[j]));
     let bent = four(|j| twofold * twists.along[j] + dot(slope, steps[j]));
     let mixed = four(|j| {
-        let a = steps[j];
         lead * twists.along[j]
-            + cosine[0] * (force[1] * a[2] - force[2] * a[1])
-            + cubic[0] * (phi_force * a[0] + phi[0] * along_force[j])
+            + cosine[0] * dot(arm, steps[j])
+            + cubic[0] * (phi_force * dot(shift, steps[j]) + along_shift * along_force[j])
     });
+    let by_rise_twice = step.translation_by_rise_twice()
+        * (force[1] - cosine[0] * force_once[1] + cubic[0] * force_twice[1]);
     let lever = four(|j| cross(force, twists.rotation[j]));
     let plain = 1.0 - cubic[0] * square;
     let shift_once = cross(phi, rho);
@@ -348,8 +364,9 @@ fn work(
             + along[j] * bent[i]
             + cubic[0]
                 * (along_force[i] * along_translation[j] + along_force[j] * along_translation[i])
-            + shifts[i] * mixed[j]
-            + shifts[j] * mixed[i]
+            + RISE_BY_GAUSS[i] * mixed[j]
+            + RISE_BY_GAUSS[j] * mixed[i]
+            + RISE_BY_GAUSS[i] * RISE_BY_GAUSS[j] * by_rise_twice
             - 0.5 * correction
     });
     let gradient = four(|j| dot(force, twists.displacement[j]) + dot(moment, twists.rotation[j]));

@@ -34,7 +34,8 @@ fn displacement_and_rotation<D: DualNum<Primitive = f64> + Copy>(
         [D::from(0.0), D::from(1.0), D::from(0.0)],
     );
     let mut rho: [D; 3] = std::array::from_fn(|i| lever[i] * weight);
-    rho[1] += D::from(h);
+    let rise = b[2] - a[2];
+    rho[1] += D::from(h) - rise * rise * (h.powi(3) / 80.0);
     let mut twist = [[D::from(0.0); 4]; 4];
     for i in 0..3 {
         twist[i][3] = rho[i];
