@@ -39,7 +39,7 @@ def test_tests_that_are_named_exist(page):
 
 def test_each_promise_has_a_test():
     page = (ROOT / "docs" / "promises.md").read_text()
-    promises = [item for item in re.split(r"\n(?:- |\n)", page) if item.startswith("**") or item.startswith("- **")]
+    promises = [item for item in re.split(r"\n(?:- |\n)", page) if item.startswith(("**", "- **"))]
     assert len(promises) > 20
     assert [promise for promise in promises if not re.search(r"`test_\w+`", promise)] == []
 
