@@ -64,8 +64,10 @@ def roughness(shape: Shape) -> float:
 
 
 def geometry(shape: Shape) -> Misses:
-    """Frames, torsion, angle of ribs, curvature, edges and lengths."""
+    """Residuals, frames, torsion, angle of ribs, curvature, edges and lengths."""
     frame, bend, slope, result = shape.frame, shape.bend, shape.slope, shape.result
+    tolerance = shape.tables.get("solver", {}).get("tolerance", 1e-8)
+    yield "residuals", max(result["residuals"].values()), tolerance
     gram = np.einsum("nij,nik->njk", frame, frame)
     yield "frames are orthonormal", np.abs(gram - np.eye(3)).max(), ROUNDING
     yield "frames are right-handed", float(np.linalg.det(frame).min() < 0.0), 0.5

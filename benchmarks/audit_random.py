@@ -3,8 +3,8 @@
     python benchmarks/audit_random.py [--kinds link points] [--count 3200] [--seed 1] [--out records.jsonl]
 
 All scenarios are feasible. A converged result is false where the audit, which shares no code with the solver, finds a
-claim that does not hold, or where the energy on a uniform mesh of four times as many elements is farther away than the
-estimated errors of both allow. A scenario in millimetres is solved in metres, too.
+claim that does not hold, or where the energy on a uniform mesh of four times as many elements is farther away than is
+allowed. A scenario in millimetres is solved in metres, too.
 """
 
 from __future__ import annotations
@@ -19,11 +19,17 @@ import numpy as np
 import fishbone as fb
 import tables
 from audit import HONESTY, LEAST_ERROR, failures
+from audit_model import Board
 from random_scenarios import KINDS, scaled, scenario
 
 Json = dict[str, Any]
 
 FINER = 4
+MOST = 20_000
+"""Greatest number of elements."""
+ACCURACY = 1e-3
+NOTHING = 1e-7
+"""An energy that is nothing but rounding, in R_f/U."""
 MILLIMETRE = 1e-3
 TOTAL = 3200
 SEED = 1
@@ -46,23 +52,37 @@ def audited(kind: str, index: int, seed: int) -> Json:
         "milliseconds": 1e3 * found.solve_time,
     }
     if found.status == "converged":
-        record |= finer(found)
+        record["finer"] = finer(made, found)
         record["failures"] = failures(made, found.to_dict())
-        if record["finer"] is not None and record["finer"] > 1.0:
-            record["failures"].append(f"energy on a finer mesh: {record['finer']:.3g} of what is allowed")
+        if beyond(record, "accuracy"):
+            record["failures"].append(f"energy on a finer mesh: {record['finer']}")
         if kind == "units":
             record["failures"] += in_metres(made, found)
     return record
 
 
-def finer(found: fb.Equilibrium) -> Json:
-    """Change of the energy on a mesh four times as fine over what the errors allow; null where none is found."""
-    fine = found.refined(min(FINER * (len(found.u) - 1), 20_000))
+def finer(made: Json, found: fb.Equilibrium) -> Json | None:
+    """Change of the energy on a mesh four times as fine, and what is allowed, relative; None where none is found.
+
+    By the estimates, the change that the errors of both meshes make is allowed. `fishbone` and `sadowsky` have minima
+    next to each other that differ in where ribs turn over; for them the accuracy that was asked for is allowed.
+    """
+    fine = found.refined(min(FINER * (len(found.u) - 1), MOST))
     if fine is None or fine.error is None or found.error is None:
-        return {"finer": None}
-    scale = max(abs(found.energy), abs(found.elastic_energy))
-    allowed = max(LEAST_ERROR, HONESTY * (found.error.energy + fine.error.energy)) * scale
-    return {"finer": abs(found.energy - fine.energy) / max(allowed, 1e-12), "error": found.error.energy}
+        return None
+    board = Board(made)
+    scale = max(abs(found.energy), abs(found.elastic_energy), NOTHING * board.sheet[0] / board.length)
+    estimates = max(LEAST_ERROR, HONESTY * (found.error.energy + fine.error.energy))
+    return {
+        "change": abs(found.energy - fine.energy) / scale,
+        "estimates": estimates,
+        "accuracy": estimates if found.energy_model == "wunderlich" else max(estimates, ACCURACY),
+    }
+
+
+def beyond(record: Json, allowed: str) -> bool:
+    """Whether the energy changes by more than is allowed on a finer mesh."""
+    return record["finer"] is not None and record["finer"]["change"] > record["finer"][allowed]
 
 
 def in_metres(made: Json, found: fb.Equilibrium) -> list[str]:
@@ -90,6 +110,7 @@ def row(records: list[Json]) -> list[str]:
         str(sum(record["status"] == "infeasible" for record in records)),
         str(sum(bool(record["failures"]) for record in converged)),
         str(sum(record["finer"] is not None for record in converged)),
+        str(sum(beyond(record, "estimates") for record in converged)),
         f"{np.median(iterations):.0f}, {np.percentile(iterations, 99):.0f}",
         f"{np.median(times):.1f}, {np.percentile(times, 99):.0f}",
     ]
@@ -101,7 +122,8 @@ HEADER = [
     "converged",
     "called infeasible",
     "false",
-    "compared with a finer mesh",
+    "with a finer mesh",
+    "change beyond the estimates",
     "iterations: median, 99 %",
     "ms: median, 99 %",
 ]

@@ -35,6 +35,23 @@ def test_random_scenarios_converge_to_what_they_claim(kind: str, numbers: range)
     assert [record for record in records if record["failures"]] == []
 
 
+def test_result_that_no_finer_mesh_improves_is_within_the_tolerance() -> None:
+    """Its mesh is the first one, which is searched to a rough tolerance only."""
+    found = fb.solve(fb.Scenario.from_dict(scenario("corners", 6, SEED)))
+    assert found.status != "converged" or max(found.residuals) <= 1e-8
+
+
+@pytest.mark.parametrize(("kind", "number"), [("layers", 9), ("hinges and slides", 12)])
+def test_places_where_ribs_turn_over_are_not_those_of_the_mesh(kind: str, number: int) -> None:
+    """Energies that do not know the width: one Newton step on a finer mesh finds ribs that turn over where they did."""
+    found = fb.solve(fb.Scenario.from_dict(scenario(kind, number, SEED)), strict=True)
+    fine = found.refined(4 * (len(found.u) - 1))
+    assert fine is not None
+    assert found.error is not None
+    assert found.energy == pytest.approx(fine.energy, rel=1e-3)
+    assert max(found.error) <= 1e-3
+
+
 def test_random_scenarios_are_the_same_every_time_and_differ() -> None:
     for kind in KINDS:
         assert scenario(kind, 1, SEED) == scenario(kind, 1, SEED)
