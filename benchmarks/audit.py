@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import nnls
+from scipy.sparse import csr_array, eye_array, lil_array
+from scipy.sparse.linalg import spsolve
 from scipy.spatial.transform import Rotation
 
 from audit_model import SAME_PLACE, Array, Json, Shape, rib_end
@@ -235,7 +237,7 @@ def stationarity(shape: Shape) -> Misses:
         rest = shape.integral(off_slope * hat + 0.5 * by_mean + by_rate * fall)
         np.add.at(slope_rest, shape.first + end, rest)
         np.add.at(span, shape.first + end, 0.5 * shape.h * ~shape.is_rigid)
-    fold_seam(shape, bend_rest, slope_rest, span)
+    fold_seam(shape, bend_rest, span)
     free = span > 0.0
     worst = np.abs(bend_rest[free] / span[free]).max()
     yield "law of bending", worst, STATIONARITY * roughness(shape) * moment
@@ -245,14 +247,13 @@ def stationarity(shape: Shape) -> Misses:
     yield from pressing_ribs(shape, slope_rest, moment)
 
 
-def fold_seam(shape: Shape, bend_rest: Array, slope_rest: Array, span: Array) -> None:
-    """The two nodes of a seam are one."""
+def fold_seam(shape: Shape, bend_rest: Array, span: Array) -> None:
+    """The two nodes of a seam have one bend."""
     if not shape.tables["belt"].get("closed", False):
         return
     sign = (-1.0) ** shape.result["half_turns"]
-    for rest in (bend_rest, slope_rest):
-        rest[0] += sign * rest[-1]
-        rest[-1] = 0.0
+    bend_rest[0] += sign * bend_rest[-1]
+    bend_rest[-1] = 0.0
     span[0] += span[-1]
     span[-1] = span[0]
 
@@ -260,29 +261,44 @@ def fold_seam(shape: Shape, bend_rest: Array, slope_rest: Array, span: Array) ->
 def pressing_ribs(shape: Shape, rest: Array, moment: float) -> Misses:
     """Ribs press on each other only where they touch, and never pull: the rest is a sum of such pressures."""
     slack, v = slacks(shape)
-    columns = []
-    for m, side in np.argwhere((slack < ACTIVE) & ~shape.is_rigid[:, None]):
-        k = shape.first[m]
-        turn = shape.geodesic[m] * (shape.slope[k] + shape.slope[k + 1]) / 2.0
-        column = np.zeros(len(rest))
-        column[k : k + 2] = v[m, side] * np.array([turn - 1.0 / shape.h[m], turn + 1.0 / shape.h[m]])
-        columns.append(column)
-    # A change of slope at a joint goes on beyond it, with the derivative of the rule of corners.
-    rows = np.vstack([rest, *columns])
-    for k in np.flatnonzero(np.diff(shape.u) <= SAME_PLACE * shape.board.length)[::-1]:
-        rows[:, k] += rows[:, k + 1] * (1.0 + shape.slope[k + 1] ** 2) / (1.0 + shape.slope[k] ** 2)
-        rows[:, k + 1] = 0.0
-    if shape.tables["belt"].get("closed", False):
-        rows[1:, 0] += (-1.0) ** shape.result["half_turns"] * rows[1:, -1]
-        rows[1:, -1] = 0.0
-    counted = ~is_held(shape)
-    left = rows[0, counted]
-    if columns:
-        _, miss = nnls(rows[1:, counted].T, -left)
-    else:
-        miss = np.linalg.norm(left)
+    places, sides = np.nonzero((slack < ACTIVE) & ~shape.is_rigid[:, None])
+    k = shape.first[places]
+    turn = shape.geodesic[places] * (shape.slope[k] + shape.slope[k + 1]) / 2.0
+    pressures = lil_array((len(rest), len(places)))
+    pressures[k, np.arange(len(k))] = v[places, sides] * (turn - 1.0 / shape.h[places])
+    pressures[k + 1, np.arange(len(k))] = v[places, sides] * (turn + 1.0 / shape.h[places])
+    go_on, counted = joined(shape), ~is_held(shape)
+    left, columns = (go_on @ rest)[counted], (go_on @ pressures.tocsr())[counted]
     scale = moment * max(np.abs(shape.bend).max() * shape.board.width, 1e-3)
-    yield "law of ribs", miss, STATIONARITY * roughness(shape) * scale
+    allowed = STATIONARITY * roughness(shape) * scale
+    yield "law of ribs", least_rest(left, columns, allowed), allowed
+
+
+def least_rest(left: Array, columns: csr_array, enough: float) -> float:
+    """Norm of what pressures, which are not negative, leave of a rest: the least one, or one that is small enough."""
+    columns = columns[:, np.flatnonzero(np.abs(columns).sum(axis=0))]
+    square = columns.T @ columns
+    if square.shape[0] == 0:
+        return float(np.linalg.norm(left))
+    damping = 1e-12 * square.trace() / square.shape[0]
+    pressure = spsolve((square + damping * eye_array(square.shape[0])).tocsc(), -(columns.T @ left))
+    rest = float(np.linalg.norm(left + columns @ np.maximum(pressure, 0.0)))
+    return rest if rest <= enough else float(nnls(columns.toarray(), -left)[1])
+
+
+def joined(shape: Shape) -> csr_array:
+    """Sums over nodes that have one rib slope: of a joint, by the rule of corners, and of a seam.
+
+    Shapes: (n, n)
+    """
+    sums = eye_array(len(shape.u)).tolil()
+    for k in np.flatnonzero(np.diff(shape.u) <= SAME_PLACE * shape.board.length)[::-1]:
+        sums[k] += sums[k + 1] * (1.0 + shape.slope[k + 1] ** 2) / (1.0 + shape.slope[k] ** 2)
+        sums[k + 1] *= 0.0
+    if shape.tables["belt"].get("closed", False):
+        sums[0] += (-1.0) ** shape.result["half_turns"] * sums[len(shape.u) - 1]
+        sums[len(shape.u) - 1] *= 0.0
+    return sums.tocsr()
 
 
 def is_held(shape: Shape) -> npt.NDArray[np.bool_]:

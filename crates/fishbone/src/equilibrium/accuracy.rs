@@ -159,7 +159,8 @@ impl Estimate {
     }
 }
 
-/// The equilibrium of a programme near to a point: by Newton's method, else the minimum that a search from there finds.
+/// The equilibrium of a programme next to a point: by Newton's method, else the minimum that a search from there finds;
+/// `None` where both find another one.
 fn solved_near(
     problem: &Problem,
     program: &BeltProgram,
@@ -167,6 +168,7 @@ fn solved_near(
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Option<Solution<BeltPoint>> {
     stagewise::settle(program, problem.tolerance(), near.clone())
+        .filter(|found| is_next_to(found, &near.point))
         .or_else(|| searched_near(problem, program, &near.point, proceed))
 }
 
@@ -177,13 +179,17 @@ fn searched_near(
     near: &BeltPoint,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Option<Solution<BeltPoint>> {
-    /// Displacement of a node beyond which a minimum is another one, in U.
-    const ANOTHER: f64 = 0.05;
     let search = Search::of(problem);
     let barrier = search.settings.warm_barrier;
     let found = search.only_from(program, near.clone(), barrier, proceed);
-    let is_near = found.at.point.distance(near) <= ANOTHER;
-    (found.outcome == Outcome::Converged && is_near).then_some(found)
+    (found.outcome == Outcome::Converged && is_next_to(&found, near)).then_some(found)
+}
+
+/// Whether a solution is not another equilibrium than the one that a point is close to.
+fn is_next_to(found: &Solution<BeltPoint>, point: &BeltPoint) -> bool {
+    /// Displacement of a node beyond which an equilibrium is another one, in U.
+    const ANOTHER: f64 = 0.05;
+    found.at.point.distance(point) <= ANOTHER
 }
 
 /// The quantities of which the error is estimated.
