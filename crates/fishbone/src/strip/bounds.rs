@@ -13,8 +13,8 @@ pub(crate) const BOUNDS: usize = 2 + ACTIVE;
 /// Largest share |s| V/2 of the convergence at which ribs meet at the edge of their own stretch, dimensionless.
 ///
 /// Where ribs meet, `wunderlich` has no bound, and rounding of the slopes decides its slope. This share keeps it smooth
-/// to the digits of a slope, and costs 1e-6 of the width.
-const CLOSEST: f64 = 1.0 - 1e-6;
+/// to the digits of a slope, and costs 1e-5 of the width.
+const CLOSEST: f64 = 1.0 - 1e-5;
 
 /// The active edges of an element: edges of the board, other than its own stretch's two, that bound its ribs.
 pub(crate) type ActiveEdges<W = f64> = [Option<Edge<W>>; ACTIVE];
@@ -98,7 +98,7 @@ pub(crate) struct RibBounds<'a, W = f64> {
 
 impl<'a, W: DualNum<Primitive = f64> + Copy> RibBounds<'a, W> {
     /// Slacks of the ribs against crossing on the board, by slopes at both ends of the element; admissible where positive:
-    /// 1e-6 less than `1 − s v` at the +ζ and at the −ζ edge of the stretch, then [`Edge::slack`] at the active edges, 1 where there are
+    /// 1e-5 less than `1 − s v` at the +ζ and at the −ζ edge of the stretch, then [`Edge::slack`] at the active edges, 1 where there are
     /// none.
     ///
     /// On an arc v is where the rib meets the inner edge; towards the outer one, which a rib meets before V/2, it is V/2

@@ -158,6 +158,38 @@ struct InteriorPoint<'a, P: Program<X, U, N>, const X: usize, const U: usize, co
     iteration: usize,
     admissible: bool,
     interrupted: bool,
+    progress: Progress,
+}
+
+/// How long the residual has not fallen since the barrier is at its least.
+#[derive(Debug, Clone, Copy)]
+struct Progress {
+    /// Least residual, and the count of iterations since it was found.
+    least: f64,
+    since: usize,
+}
+
+impl Progress {
+    const NONE: Self = Self {
+        least: f64::INFINITY,
+        since: 0,
+    };
+
+    /// Takes in the residual of one more iteration; false where rounding keeps it from falling any further.
+    fn goes_on(&mut self, residual: f64) -> bool {
+        /// Ratio of residuals below which the residual has fallen, dimensionless.
+        const FALLEN: f64 = 0.5;
+        /// Count of iterations within which it must fall, a number.
+        const PATIENCE: usize = 50;
+        self.since += 1;
+        if residual < FALLEN * self.least {
+            *self = Self {
+                least: residual,
+                since: 0,
+            };
+        }
+        self.since < PATIENCE
+    }
 }
 
 impl<'a, P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>
@@ -176,6 +208,7 @@ impl<'a, P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>
             iteration: 0,
             admissible,
             interrupted: false,
+            progress: Progress::NONE,
         }
     }
 
@@ -202,6 +235,11 @@ impl<'a, P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>
                 .lower_barrier(&residuals, self.settings.tolerance)
             {
                 self.filter.clear();
+                self.progress = Progress::NONE;
+            }
+            let is_least = self.iterate.is_barrier_least(self.settings.tolerance);
+            if is_least && !self.progress.goes_on(residuals.largest()) {
+                return Outcome::Stalled;
             }
             self.iterate.assemble();
             let is_feasible =

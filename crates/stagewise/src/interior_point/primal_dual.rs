@@ -111,7 +111,7 @@ impl<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> Primal
         /// Ratio of residual to barrier parameter at which a barrier problem counts as solved; dimensionless.
         const SOLVED: f64 = 10.0;
         let heaviest = self.barrier.heaviest();
-        let least = 0.1 * tolerance / heaviest;
+        let least = self.least_barrier(tolerance);
         let mut lowered = false;
         loop {
             let parameter = self.barrier.parameter;
@@ -129,7 +129,16 @@ impl<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> Primal
 
     /// Sets the barrier parameter to the one at which a point of a residual counts as converged.
     pub(crate) fn set_barrier(&mut self, tolerance: f64) {
-        self.barrier.parameter = 0.1 * tolerance / self.barrier.heaviest();
+        self.barrier.parameter = self.least_barrier(tolerance);
+    }
+
+    /// Whether the barrier parameter is as low as it gets for a tolerance.
+    pub(crate) fn is_barrier_least(&self, tolerance: f64) -> bool {
+        self.barrier.parameter <= self.least_barrier(tolerance)
+    }
+
+    fn least_barrier(&self, tolerance: f64) -> f64 {
+        0.1 * tolerance / self.barrier.heaviest()
     }
 
     /// Inertia of the second variation. Overwrites the derivatives.
