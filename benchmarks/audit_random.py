@@ -65,7 +65,8 @@ def finer(made: Json, found: fb.Equilibrium) -> Json | None:
     """Change of the energy on a mesh four times as fine, and what is allowed, relative; None where none is found.
 
     By the estimates, the change that the errors of both meshes make is allowed. `fishbone` and `sadowsky` have minima
-    next to each other that differ in where ribs turn over; for them the accuracy that was asked for is allowed.
+    next to each other that differ in where ribs turn over; for them the accuracy that was asked for is allowed, or what
+    the result warns of.
     """
     fine = found.refined(min(FINER * (len(found.u) - 1), MOST))
     if fine is None or fine.error is None or found.error is None:
@@ -73,10 +74,11 @@ def finer(made: Json, found: fb.Equilibrium) -> Json | None:
     board = Board(made)
     scale = max(abs(found.energy), abs(found.elastic_energy), NOTHING * board.sheet[0] / board.length)
     estimates = max(LEAST_ERROR, HONESTY * (found.error.energy + fine.error.energy))
+    stated = np.nanmax([ACCURACY, *found.error])
     return {
         "change": abs(found.energy - fine.energy) / scale,
         "estimates": estimates,
-        "accuracy": estimates if found.energy_model == "wunderlich" else max(estimates, ACCURACY),
+        "accuracy": estimates if found.energy_model == "wunderlich" else max(estimates, stated),
     }
 
 

@@ -241,7 +241,7 @@ impl Level {
         if again.has_converged() { again } else { level }
     }
 
-    /// The same minimum on its own mesh, to the tolerance of a search.
+    /// The same minimum on its own mesh, to the tolerance of a search; where that does not converge, a minimum from the guess.
     fn again(
         self,
         problem: &Problem,
@@ -253,7 +253,13 @@ impl Level {
         let program = self.program.clone();
         let mut level = Self::on(problem, search, program, Some(own), barrier, proceed);
         level.solution.iterations += self.solution.iterations;
-        level
+        if level.has_converged() {
+            return level;
+        }
+        let barrier = search.settings.cold_barrier;
+        let mut afresh = Self::on(problem, search, self.program, None, barrier, proceed);
+        afresh.solution.iterations += level.solution.iterations;
+        afresh
     }
 
     /// Whether a solution that has converged has done so to a tolerance.
