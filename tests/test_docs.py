@@ -37,6 +37,13 @@ def test_tests_that_are_named_exist(page):
         assert re.search(rf"\b{name}\b\(", sources), name
 
 
+def test_each_promise_has_a_test():
+    page = (ROOT / "docs" / "promises.md").read_text()
+    promises = [item for item in re.split(r"\n(?:- |\n)", page) if item.startswith(("**", "- **"))]
+    assert len(promises) > 20
+    assert [promise for promise in promises if not re.search(r"`test_\w+`", promise)] == []
+
+
 @pages
 def test_files_that_are_named_exist(page):
     paths = re.findall(r"`((?:tests|benchmarks|crates|docs|scenarios)/[\w./]+)`", page.read_text())

@@ -8,7 +8,7 @@ use crate::scenario::SAME_PLACE;
 use crate::strip::spine::Spine;
 use crate::surface::least_spine_radius;
 use nalgebra::Vector3;
-use stagewise::{Multipliers, Outcome, Solution, Stationary, Values};
+use stagewise::{Distance, Multipliers, Outcome, Solution, Stationary, Values};
 use std::ops::ControlFlow;
 
 /// Estimated errors of a result by its mesh, relative and not negative; NaN where a quantity is not determined.
@@ -120,9 +120,15 @@ impl Estimate {
         let step = stagewise::correct(&fine, problem.tolerance(), near.clone())?;
         let mut better = (step.point, step.equalities, step.objective);
         let mut error = own.off_on(problem, &fine, &better);
-        if (ribs_meet || error.largest() > most)
-            && let Some(solution) = solved_near(problem, &fine, &near, proceed)
-        {
+        // A density that does not know the width lets ribs turn over anywhere at no cost, and one step does not move the
+        // place from element to element.
+        let may_turn_over = !program.model.knows_width() && error.largest() <= problem.accuracy();
+        let solution = match ribs_meet || error.largest() > most {
+            true => solved_near(problem, &fine, &near, proceed),
+            false if may_turn_over => searched_near(problem, &fine, &near.point, proceed),
+            false => None,
+        };
+        if let Some(solution) = solution {
             let Stationary { point, multipliers } = solution.at;
             better = (point, multipliers.equalities, solution.values.objective);
             error = own.off_on(problem, &fine, &better);
@@ -153,19 +159,37 @@ impl Estimate {
     }
 }
 
-/// The equilibrium of a programme near to a point: by Newton's method, else the minimum that a search from there finds.
+/// The equilibrium of a programme next to a point: by Newton's method, else the minimum that a search from there finds;
+/// `None` where both find another one.
 fn solved_near(
     problem: &Problem,
     program: &BeltProgram,
     near: &Stationary<BeltPoint>,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Option<Solution<BeltPoint>> {
-    stagewise::settle(program, problem.tolerance(), near.clone()).or_else(|| {
-        let search = Search::of(problem);
-        let barrier = search.settings.warm_barrier;
-        let found = search.only_from(program, near.point.clone(), barrier, proceed);
-        (found.outcome == Outcome::Converged).then_some(found)
-    })
+    stagewise::settle(program, problem.tolerance(), near.clone())
+        .filter(|found| is_next_to(found, &near.point))
+        .or_else(|| searched_near(problem, program, &near.point, proceed))
+}
+
+/// The minimum of a programme that a search finds next to a point; `None` where it finds another one.
+fn searched_near(
+    problem: &Problem,
+    program: &BeltProgram,
+    near: &BeltPoint,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Option<Solution<BeltPoint>> {
+    let search = Search::of(problem);
+    let barrier = search.settings.warm_barrier;
+    let found = search.only_from(program, near.clone(), barrier, proceed);
+    (found.outcome == Outcome::Converged && is_next_to(&found, near)).then_some(found)
+}
+
+/// Whether a solution is not another equilibrium than the one that a point is close to.
+fn is_next_to(found: &Solution<BeltPoint>, point: &BeltPoint) -> bool {
+    /// Displacement of a node beyond which an equilibrium is another one, in U.
+    const ANOTHER: f64 = 0.05;
+    found.at.point.distance(point) <= ANOTHER
 }
 
 /// The quantities of which the error is estimated.

@@ -77,7 +77,8 @@ pub(super) fn refine(
         level.estimate(problem, f64::INFINITY, proceed);
         iterations += level.solution.iterations;
         level.solution.iterations = iterations;
-        if level.solution.outcome == Outcome::Interrupted || level.is_accurate(problem.accuracy()) {
+        let is_done = level.is_accurate(problem.accuracy()) && level.is_precise(search.tolerance);
+        if level.solution.outcome == Outcome::Interrupted || is_done {
             return level;
         }
         failures += usize::from(!level.is_sound());
@@ -92,6 +93,9 @@ pub(super) fn refine(
     }
     let mut best = best.expect("the first mesh has a programme");
     best.solution.iterations = iterations;
+    if !best.is_precise(search.tolerance) {
+        best = best.again(problem, search, proceed);
+    }
     best.estimate(problem, Estimate::WILD, proceed);
     best
 }
@@ -240,6 +244,32 @@ impl Level {
         let mut again = with(search.settings.close_barrier, proceed);
         again.solution.iterations += level.solution.iterations;
         if again.has_converged() { again } else { level }
+    }
+
+    /// The same minimum on its own mesh, to the tolerance of a search; where that does not converge, a minimum from the guess.
+    fn again(
+        self,
+        problem: &Problem,
+        search: &Search,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Self {
+        let barrier = search.settings.close_barrier;
+        let own = (&self.program, &self.solution.at.point);
+        let program = self.program.clone();
+        let mut level = Self::on(problem, search, program, Some(own), barrier, proceed);
+        level.solution.iterations += self.solution.iterations;
+        if level.has_converged() {
+            return level;
+        }
+        let barrier = search.settings.cold_barrier;
+        let mut afresh = Self::on(problem, search, self.program, None, barrier, proceed);
+        afresh.solution.iterations += level.solution.iterations;
+        afresh
+    }
+
+    /// Whether a solution that has converged has done so to a tolerance.
+    fn is_precise(&self, tolerance: f64) -> bool {
+        !self.has_converged() || self.solution.residuals.largest() <= tolerance
     }
 
     /// The minimum on a mesh, from a shape of another programme with a first barrier, or from the guess; without an
