@@ -146,6 +146,24 @@ def test_flat_belt_has_no_radius_on_the_spine_and_infinite_ones_over_the_area() 
     assert result(equilibrium)["bend_radius"] == expected
 
 
+def test_belt_that_rounding_bends_is_flat() -> None:
+    """The taut belt, whose bends are of the order of the residual or less."""
+    equilibrium = solve(belt([support("start", ORIGIN, ORIGIN), support("end", (0.0, 1.0, 0.0), ORIGIN)]))
+    assert np.abs(equilibrium.bend).max() < 1e-8
+    assert equilibrium.least_spine_radius is None
+    assert equilibrium.least_bend_radius is None
+    assert equilibrium.bend_radius == (None, (math.inf, math.inf, math.inf))
+
+
+def test_belt_that_bends_a_little_is_not_flat() -> None:
+    """A push to the side of 1e-6 R_f/U² bends a cantilever by as much at its clamp."""
+    scenario = belt([support("start", ORIGIN, ORIGIN)])
+    scenario["loads"] = {"points": [{"at": "end", "force": [1e-6, 0.0, 0.0]}]}
+    equilibrium = solve(scenario)
+    assert equilibrium.least_spine_radius is not None
+    assert equilibrium.least_spine_radius.value == pytest.approx(1e6, rel=1e-2)
+
+
 def test_result_has_the_radii_of_the_attributes() -> None:
     equilibrium = solve(quarter_twist(80))
     on_spine, over_area = equilibrium.bend_radius

@@ -174,6 +174,25 @@ def test_what_is_no_pose_is_refused(position: Any, rotation: Any, words: str) ->
     assert tracker.update(END, [0.0, 0.0, 0.0]).status == "converged"
 
 
+@pytest.mark.parametrize(
+    ("position", "rotation"),
+    [([0.0, 1e300, 0.0], [0.0, 0.0, 0.0]), ([0.0, 0.0, -1e7], [0.0, 0.0, 0.0]), (END, [0.0, 1e300, 0.0])],
+)
+def test_pose_that_no_scenario_may_hold_is_refused_in_the_same_words(
+    position: list[float], rotation: list[float]
+) -> None:
+    tracker = fb.Tracker(example())
+    tables = example().to_dict()
+    tables["supports"][1] |= {"position": position, "rotation": rotation}
+    with pytest.raises(fb.InvalidScenario) as scenario:
+        fb.Scenario.from_dict(tables)
+    with pytest.raises(fb.InvalidScenario) as refused:
+        tracker.update(position, rotation)
+    assert str(refused.value) == str(scenario.value)
+    assert (refused.value.field, refused.value.allowed) == (scenario.value.field, scenario.value.allowed)
+    assert tracker.update(END, [0.0, 0.0, 0.0]).status == "converged"
+
+
 def test_what_cannot_be_followed_is_refused() -> None:
     """No equilibrium, no clamp, no multipliers, no such support."""
     with pytest.raises(fb.NoTracker, match="nothing to follow"):

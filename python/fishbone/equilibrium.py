@@ -34,7 +34,7 @@ MAX_REACH = 10.0
 
 
 class Reaction(NamedTuple):
-    """Force and moment of a support on the belt, world axes.
+    """Force and moment of a support on the belt, world axes; a component is NaN where the shape does not determine it.
 
     Shapes: (3,) each.
     Units: force [N], moment about the support point [N·m], in the scenario's own units.
@@ -46,6 +46,8 @@ class Reaction(NamedTuple):
 
 class Internal(NamedTuple):
     """Force and moment of the belt beyond u on the part before u, world axes, the moment about the spine point.
+
+    A component is NaN where the shape does not determine it.
 
     Shapes: (n, 3) each.
     """
@@ -447,6 +449,8 @@ class Equilibrium:
     @property
     def links(self) -> Floats:
         """Force of each link on the belt at its `to`, in the order of the scenario; the opposite acts at its `from`.
+
+        A component is NaN where the shape does not determine it.
 
         Shapes: (m, 3).
         """

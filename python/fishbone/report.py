@@ -32,6 +32,8 @@ NOUGHT = 1e-9
 """Largest rounding error of a rib angle [degrees]."""
 SIDE = {1: "along solver.bulge", 0: "neither along solver.bulge nor against it", -1: "against solver.bulge"}
 """The side to which a belt bulges."""
+UNDETERMINED = "not determined"
+"""The cell of a number that the shape does not determine."""
 MINIMUM = {True: "yes", False: "no", None: "not known"}
 """Whether an equilibrium is a local minimum."""
 
@@ -80,13 +82,21 @@ def row(vector: Floats) -> list[str]:
 
     >>> row(np.array([12.3456, -0.0000004, 1.0]))
     ['12.346', '0.000', '1.000']
+
+    A component that is NaN is not determined.
+
+    >>> row(np.array([1.0, np.nan, 0.0]))
+    ['1.0000', 'not determined', '0.0000']
     """
-    largest = float(np.max(np.abs(vector)))
+    largest = float(np.max(np.abs(vector), initial=0.0, where=~np.isnan(vector)))
     decimals = DIGITS - 1 - math.floor(math.log10(largest)) if largest > 0.0 else DIGITS - 1
     if not 0 <= decimals <= 2 * DIGITS:
-        return [f"{component:.{DIGITS - 1}e}" for component in vector]
+        return [UNDETERMINED if math.isnan(component) else f"{component:.{DIGITS - 1}e}" for component in vector]
     # Adding 0.0 turns a rounded −0 into 0.
-    return [f"{round(component, decimals) + 0.0:.{decimals}f}" for component in vector.tolist()]
+    return [
+        UNDETERMINED if math.isnan(component) else f"{round(component, decimals) + 0.0:.{decimals}f}"
+        for component in vector.tolist()
+    ]
 
 
 def _scalars(equilibrium: Equilibrium) -> Table:

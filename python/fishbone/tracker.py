@@ -56,7 +56,8 @@ class Tracker:
 
         Shapes: (3,) each.
         Units: those of the scenario; rad.
-        Errors: `InvalidArgument` for other shapes and for numbers that are not finite.
+        Errors: `InvalidArgument` for other shapes and for numbers that are not finite; `InvalidScenario` for a pose
+        that no scenario may hold, such as a position too many lengths away. The tracker then stays where it was.
         """
         return Update(*self._inner.update(triple("position", position), triple("rotation", rotation)))
 
@@ -92,6 +93,8 @@ class Tracker:
 
     def reaction(self, support: Place) -> Reaction:
         """Force and moment of a support on the belt, without a solve; named as for `Equilibrium.reaction`.
+
+        A component is NaN where the shape does not determine it.
 
         Errors: `NoSupport`.
         """

@@ -2,7 +2,7 @@
 
 use crate::array::{self, Grid, Points, Scalars};
 use crate::equilibrium::Equilibrium;
-use crate::errors::raised;
+use crate::errors::{invalid_scenario, raised};
 use crate::scenario::Scenario;
 use crate::signals::Signals;
 use fishbone::analysis::tracking as core;
@@ -37,7 +37,8 @@ impl Tracker {
 
     /// (status, snapped, energy, iterations, largest residual).
     ///
-    /// Errors: those that a signal handler raises, `KeyboardInterrupt` first of all.
+    /// Errors: `InvalidScenario` for a pose that no scenario may hold; those that a signal handler raises,
+    /// `KeyboardInterrupt` first of all.
     fn update(
         &self,
         py: Python<'_>,
@@ -50,9 +51,10 @@ impl Tracker {
             self.lock()
                 .update(&position, &rotation, &mut || signals.proceed())
         });
-        match signals.raised {
-            Some(error) => Err(error),
-            None => Ok((
+        match (signals.raised, update) {
+            (Some(error), _) => Err(error),
+            (None, Err(refused)) => Err(invalid_scenario(py, &refused, None)),
+            (None, Ok(update)) => Ok((
                 update.status.name(),
                 update.snapped,
                 update.energy,

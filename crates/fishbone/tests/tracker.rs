@@ -27,7 +27,8 @@ fn clamped(y: f64) -> String {
 
 fn update(tracker: &mut Tracker, y: f64, angle: f64) -> Update {
     let (position, rotation) = (Vector3::new(0.0, y, 0.1), Vector3::new(0.0, 0.0, angle));
-    tracker.update(&position, &rotation, &mut || ControlFlow::Continue(()))
+    let updated = tracker.update(&position, &rotation, &mut || ControlFlow::Continue(()));
+    updated.unwrap()
 }
 
 #[test]
@@ -72,6 +73,7 @@ fn test_interrupted_update_leaves_the_tracker_at_its_last_pose() {
     let ended = tracker.update(&far, &Vector3::new(1.0, 2.0, 0.5), &mut || {
         ControlFlow::Break(())
     });
+    let ended = ended.unwrap();
     assert_eq!(ended.status, Status::NotConverged);
     assert!((tracker.energy() / energy - 1.0).abs() < 1e-12);
     assert_eq!(update(&mut tracker, 0.5, 0.0).status, Status::Converged);
@@ -101,7 +103,7 @@ fn test_belt_follows_its_first_support() {
     let mut tracker = Tracker::new(&solved(&clamped(0.5)), 0).unwrap();
     let to = Vector3::new(0.05, -0.02, 0.03);
     let moved = tracker.update(&to, &Vector3::zeros(), &mut || ControlFlow::Continue(()));
-    assert_eq!(moved.status, Status::Converged);
+    assert_eq!(moved.unwrap().status, Status::Converged);
     let equilibrium = tracker.equilibrium();
     assert!((equilibrium.spine.pose[0].position - to).norm() < 1e-9);
     for (pose, position) in equilibrium.spine.pose.iter().zip(tracker.positions()) {
@@ -118,18 +120,16 @@ fn test_invalid_pose_leaves_the_tracker_at_its_last_pose() {
     let energy = tracker.energy();
     let (at, level) = (Vector3::new(0.0, 0.5, 0.1), Vector3::zeros());
     let poses = [
-        (f64::NAN * at, level),
-        (1e9 * at, level),
-        (at, Vector3::new(f64::NAN, 0.0, 0.0)),
-        (at, Vector3::new(0.0, f64::INFINITY, 0.0)),
+        (f64::NAN * at, level, "position[0]"),
+        (1e300 * at, level, "position[1]"),
+        (at, Vector3::new(f64::NAN, 0.0, 0.0), "rotation[0]"),
+        (at, Vector3::new(0.0, f64::INFINITY, 0.0), "rotation[1]"),
+        (at, Vector3::new(0.0, 1e300, 0.0), "rotation"),
     ];
-    for (position, rotation) in poses {
+    for (position, rotation, field) in poses {
         let go_on = &mut || ControlFlow::Continue(());
-        let refused = tracker.update(&position, &rotation, go_on);
-        assert_eq!(
-            (refused.status, refused.snapped),
-            (Status::Infeasible, false)
-        );
+        let refused = tracker.update(&position, &rotation, go_on).unwrap_err();
+        assert_eq!(refused.field(), Some(&*format!("supports[1].{field}")));
         assert_eq!(tracker.energy(), energy);
     }
 }

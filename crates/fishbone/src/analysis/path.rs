@@ -140,15 +140,9 @@ impl Path {
             position: *position,
         });
         let poses: Vec<_> = std::iter::once(first).chain(others).collect();
-        for (i, (pose, (_, rotation))) in poses[1..].iter().zip(given).enumerate() {
-            if rotation.iter().any(|angle| !angle.is_finite()) {
-                return Err(NoPath::NoPose(
-                    i,
-                    "found a rotation that is not finite".to_owned(),
-                ));
-            }
-            let refused = |error: ScenarioError| NoPath::NoPose(i, error.to_string());
-            problem.check_support_pose(support, pose).map_err(refused)?;
+        for (i, (position, rotation)) in given.iter().enumerate() {
+            let checked = problem.check_support_pose(support, position, rotation);
+            checked.map_err(|error| NoPath::NoPose(i, error.to_string()))?;
         }
         if poses.iter().all(|pose| *pose == first) {
             return Err(NoPath::Nothing);

@@ -3,7 +3,7 @@
 use crate::equilibrium::{Equilibrium, Status, Uncertified, of_solution, solve_near};
 use crate::geometry::{Pose, Wrench, exp};
 use crate::names::named;
-use crate::problem::program::{BeltPoint, BeltProgram, rows_of};
+use crate::problem::program::{BeltPoint, BeltProgram};
 use crate::problem::{Mesh, Problem, Units};
 use crate::scenario::error::ScenarioError;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
@@ -112,25 +112,25 @@ impl Tracker {
     /// Moves the support to a position and a rotation vector, world axes, and the belt with it.
     ///
     /// Nothing is allocated where the equilibrium is followed and the board has neither links nor bends. `proceed` is asked
-    /// during the motion whether to go on; `Break` leaves the tracker at its last pose. So does an infeasible pose, which no
-    /// scenario may hold: a pose that is not finite, or too many lengths of the belt away.
+    /// during the motion whether to go on; `Break` leaves the tracker at its last pose.
+    ///
+    /// # Errors
+    ///
+    /// [`ScenarioError`] for a pose that no scenario may hold: a pose that is not finite, too many lengths of the belt away, or
+    /// turned too far. The tracker stays at its last pose.
     pub fn update(
         &mut self,
         position: &Vector3<f64>,
         rotation: &Vector3<f64>,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
-    ) -> Update {
+    ) -> Result<Update, ScenarioError> {
+        let (from, support) = (self.pose, self.support);
+        self.problem
+            .check_support_pose(support, position, rotation)?;
         let goal = Pose {
             frame: exp(rotation),
             position: (position - self.problem.origin()) / self.units().length,
         };
-        let (from, support) = (self.pose, self.support);
-        let held = self.in_scenario(&goal);
-        let may_hold = self.problem.check_support_pose(support, &held).is_ok();
-        // A rotation vector that is not finite makes a finite frame.
-        if !may_hold || rotation.iter().any(|angle| !angle.is_finite()) {
-            return self.refused();
-        }
         let turn = turn_between(&from.frame, &goal.frame);
         let length = (goal.position - from.position).norm() + turn.norm();
         let mut change = |program: &mut BeltProgram, share: f64| {
@@ -146,32 +146,19 @@ impl Tracker {
         let followed = self.follower.follow(length, &mut change, proceed);
         if followed.arrived && self.is_settled() {
             self.pose = goal;
-            return Update {
+            return Ok(Update {
                 status: Status::Converged,
                 snapped: followed.jumped,
                 energy: self.energy(),
                 iterations: followed.iterations,
                 residuals: followed.residuals,
-            };
+            });
         }
-        let Ok(problem) = self.problem_at(&goal) else {
-            self.return_to_start();
-            return self.refused();
-        };
+        let problem = self.problem_at(&goal);
+        let problem = problem.expect("the pose has been checked");
         let mesh = Mesh::of(&problem, self.follower.program());
         let found = solve_near(&problem, &mesh, self.follower.point(), proceed);
-        self.take(&found, followed)
-    }
-
-    /// The outcome of a pose at which the support may not be held: the belt keeps its last pose.
-    fn refused(&mut self) -> Update {
-        Update {
-            status: Status::Infeasible,
-            snapped: false,
-            energy: self.energy(),
-            iterations: 0,
-            residuals: self.follower.solution().residuals,
-        }
+        Ok(self.take(&found, followed))
     }
 
     /// Takes over a found equilibrium where the last equilibrium could not be followed, or its active edges have changed.
@@ -269,17 +256,18 @@ impl Tracker {
         self.point().fields.iter().map(|fields| fields[1])
     }
 
-    /// The reaction of a support on the belt.
+    /// The reaction of a support on the belt; a component is NaN where the shape does not determine it.
     ///
     /// # Panics
     ///
     /// If there is no such support.
     pub fn reaction(&self, support: usize) -> Wrench {
         let program = self.follower.program();
-        let rows = rows_of(&self.follower.multipliers().equalities, support);
-        let held = &program.supports[support];
-        self.units()
-            .wrench(held.reaction(&self.point().poses[held.node], &rows))
+        let mut wrenches = program.reactions(self.point(), &self.follower.multipliers().equalities);
+        if let Some(undetermined) = program.undetermined(self.point()) {
+            undetermined.set(f64::NAN, &mut wrenches, &mut [], &mut []);
+        }
+        self.units().wrench(wrenches[support])
     }
 }
 

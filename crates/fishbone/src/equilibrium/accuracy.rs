@@ -2,7 +2,7 @@
 
 use super::guess::inside;
 use super::search::{Search, prolong_inequalities, prolonged};
-use crate::problem::program::{BeltPoint, BeltProgram, Piece};
+use crate::problem::program::{BeltPoint, BeltProgram, Piece, Undetermined};
 use crate::problem::{Mesh, Problem};
 use crate::scenario::SAME_PLACE;
 use crate::strip::spine::Spine;
@@ -192,6 +192,9 @@ fn is_next_to(found: &Solution<BeltPoint>, point: &BeltPoint) -> bool {
     found.at.point.distance(point) <= ANOTHER
 }
 
+/// Force and moment, world axes.
+type Wrench = (Vector3<f64>, Vector3<f64>);
+
 /// The quantities of which the error is estimated.
 struct Quantities {
     /// Total potential with its zero at the world's origin, in mean R_f/U.
@@ -200,10 +203,14 @@ struct Quantities {
     spine: Spine,
     /// Whether the belt may slide along itself, so that no position is determined.
     may_slide: bool,
-    /// Forces and moments of supports, and forces of links, in R_f/U² and R_f/U.
-    forces: Vec<Vector3<f64>>,
-    /// Forces and moments along the belt.
+    /// Forces and moments of supports, in R_f/U² and R_f/U.
+    reactions: Vec<Wrench>,
+    /// Forces of links, in R_f/U².
+    links: Vec<Vector3<f64>>,
+    /// Forces and moments along the belt; 0 where undetermined.
     internal: Vec<Vector3<f64>>,
+    /// The undetermined components of all forces and moments.
+    undetermined: Option<Undetermined>,
     /// The largest curvature on the spine.
     curvature: f64,
 }
@@ -217,21 +224,34 @@ impl Quantities {
         objective: f64,
     ) -> Self {
         let spine = problem.spine(program, point);
-        let reactions = program.reactions(point, equalities).into_iter();
-        let reactions = reactions.flat_map(|(force, moment)| [force, moment]);
+        let undetermined = program.undetermined(point);
+        let mut internal = program.internal(point, equalities);
+        if let Some(undetermined) = &undetermined {
+            undetermined.set(0.0, &mut [], &mut [], &mut internal);
+        }
         Self {
             energy: objective + problem.potential_of_origin() / problem.units().energy,
             elastic_energy: program.elastic_energy(&point.fields),
-            forces: reactions.chain(program.link_forces(equalities)).collect(),
-            internal: program
-                .internal(point, equalities)
-                .into_iter()
-                .flat_map(|(force, moment)| [force, moment])
-                .collect(),
+            reactions: program.reactions(point, equalities),
+            links: program.link_forces(equalities),
+            internal: vectors(internal),
+            undetermined,
             curvature: least_spine_radius(&spine).map_or(0.0, |least| least.value.recip()),
             spine,
             may_slide: problem.is_left_alone(),
         }
+    }
+
+    /// Forces and moments of supports, and forces of links; 0 where they are undetermined in this shape or another.
+    fn determined_with(&self, other: &Self) -> Vec<Vector3<f64>> {
+        let (mut reactions, mut links) = (self.reactions.clone(), self.links.clone());
+        for undetermined in [&self.undetermined, &other.undetermined]
+            .into_iter()
+            .flatten()
+        {
+            undetermined.set(0.0, &mut reactions, &mut links, &mut []);
+        }
+        vectors(reactions).into_iter().chain(links).collect()
     }
 
     /// By how much these are off those of a better point, with its multipliers and objective, of a programme.
@@ -254,8 +274,9 @@ impl Quantities {
             None => f64::NAN,
         });
         let largest = |forces: &[Vector3<f64>]| forces.iter().map(|f| f.norm()).fold(0.0, f64::max);
-        let pairs = self.forces.iter().zip(&better.forces);
-        let changes = pairs.map(|(own, better)| (own - better).norm());
+        let forces = better.determined_with(self);
+        let own = self.determined_with(better).into_iter();
+        let changes = own.zip(&forces).map(|(own, better)| (own - better).norm());
         let energies = [better.energy.abs(), better.elastic_energy];
         MeshError {
             energy: share(self.energy - better.energy, energies[0].max(energies[1])),
@@ -265,11 +286,17 @@ impl Quantities {
             },
             force: share(
                 changes.fold(0.0, larger),
-                largest(&better.forces).max(largest(&better.internal)),
+                largest(&forces).max(largest(&better.internal)),
             ),
             radius: share(self.curvature - better.curvature, better.curvature),
         }
     }
+}
+
+/// Forces and moments, one after the other.
+fn vectors(wrenches: Vec<Wrench>) -> Vec<Vector3<f64>> {
+    let both = |(force, moment): Wrench| [force, moment];
+    wrenches.into_iter().flat_map(both).collect()
 }
 
 /// A change as a share of the whole; 0 of nothing.

@@ -7,12 +7,13 @@ use super::search::{MinimumSettings, Search, is_flat_under_load};
 use super::stability::{self, Stability};
 use super::{Equilibrium, LinkForce, Reaction, Solved, Start, Status, winding};
 use crate::equilibrium::guess::{disturb, guess};
+use crate::geometry::Wrench;
 use crate::problem::program::{self, BeltPoint, BeltProgram, ROWS};
 use crate::problem::{Problem, number};
 use crate::scenario::{Scenario, SupportSpec};
 use crate::surface::linking::half_turns;
 use nalgebra::Vector3;
-use stagewise::{Inertia, Outcome, Solution, redundant_equalities};
+use stagewise::{Outcome, Solution, Stationary, redundant_equalities};
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 use std::sync::OnceLock;
@@ -84,18 +85,18 @@ fn equilibrium(
         Status::Infeasible | Status::NotConverged => None,
     };
     let internal = program.internal(&solution.at.point, &solution.at.multipliers.equalities);
-    let inertia = stability::inertia(problem, &program, &solution);
-    let stability = stability(status, inertia, &internal);
-    let links = program
-        .link_forces(&solution.at.multipliers.equalities)
-        .into_iter();
+    let stability = match status {
+        Status::Converged => stability::decide(problem, &program, &solution, &internal),
+        Status::Infeasible | Status::NotConverged => None,
+    };
+    let forces = Forces::of(problem, &program, &solution, internal, status);
     let is_flat = is_flat_under_load(&program, &solution.at.point);
     Equilibrium {
         status,
         message,
         warnings: [
             warnings(problem, status, stability, is_flat),
-            doubts(status, redundant.as_deref()),
+            doubts(status, redundant.as_deref(), &forces.undetermined),
             passed_through_itself(scenario, half_turns),
         ]
         .concat(),
@@ -104,14 +105,9 @@ fn equilibrium(
         elastic_energy: program.elastic_energy(&solution.at.point.fields) * units.energy,
         torsion: spine.torsion(),
         spine,
-        internal: internal.into_iter().map(|w| units.wrench(w)).collect(),
-        reactions: reactions(problem, &program, &solution),
-        links: links
-            .take(scenario.links.len())
-            .map(|force| LinkForce {
-                force: force * units.force(),
-            })
-            .collect(),
+        internal: forces.internal,
+        reactions: forces.reactions,
+        links: forces.links,
         stability,
         residuals: solution.residuals,
         iterations: solution.iterations,
@@ -312,13 +308,21 @@ fn judge(
     }
 }
 
-/// The warning of redundant constraints, which leave reactions undetermined.
-fn doubts(status: Status, redundant: Option<&str>) -> Vec<String> {
+/// The warning of forces that are not determined: of constraints that are redundant in every shape, else in this one.
+fn doubts(status: Status, redundant: Option<&str>, undetermined: &[String]) -> Vec<String> {
     let names = redundant.filter(|_| status == Status::Converged);
-    let warning = names.map(|names| {
+    let redundant = names.map(|names| {
         format!("{names} hold the same twice over: what each of them bears is not determined")
     });
-    warning.into_iter().collect()
+    let in_this_shape = || {
+        (!undetermined.is_empty()).then(|| {
+            format!(
+                "in this shape {} hold the same twice over: components of the forces that they bear are not determined",
+                undetermined.join(" and ")
+            )
+        })
+    };
+    redundant.or_else(in_this_shape).into_iter().collect()
 }
 
 /// The warning of a closed belt that ended with another number of half turns than it was given.
@@ -340,8 +344,8 @@ fn warnings(
     /// Thickness from which a belt is no thin strip, in V.
     const THICK: f64 = 0.25;
     let scenario = problem.scenario();
-    let no_slack = status != Status::Infeasible && problem.has_no_slack();
-    let flat = status == Status::Converged && is_flat;
+    let no_slack = status == Status::NotConverged && problem.has_no_slack();
+    let flat = status == Status::Converged && is_flat && stability.is_none();
     let weightless = scenario.loads.gravity.is_some_and(|g| g != [0.0; 3])
         && scenario.belt.density_value() == 0.0;
     let thick = scenario.belt.thickness();
@@ -354,7 +358,7 @@ fn warnings(
         .filter_map(more_than_a_turn);
     [
         no_slack.then(|| {
-            "the supports leave the belt less than 1e-6 of slack: the reactions are not determined".to_owned()
+            "the supports leave the belt less than 1e-6 of slack: they hardly determine its shape and its forces".to_owned()
         }),
         weightless.then(|| {
             "gravity acts on no mass: give belt.density, or that of its material or layers".to_owned()
@@ -393,39 +397,57 @@ fn more_than_a_turn((i, support): (usize, &SupportSpec)) -> Option<String> {
     })
 }
 
-/// Stability by the second variation; `None` where it is undecided. Where a part of the belt is flat, every slope of its
-/// ribs costs the same. Under stress the second variation with these slopes held does not show whether the belt is unstable
-/// with other slopes, unless it is negative already.
-fn stability(
-    status: Status,
-    inertia: Option<Inertia>,
-    internal: &[(Vector3<f64>, Vector3<f64>)],
-) -> Option<Stability> {
-    /// Internal force and moment up to which a belt counts as unstressed, in mean R_f/U² and mean R_f/U.
-    const UNSTRESSED: f64 = 1e-6;
-    let inertia = inertia.filter(|_| status == Status::Converged)?;
-    let stress = |(force, moment): &(Vector3<f64>, Vector3<f64>)| force.amax().max(moment.amax());
-    let is_stressed = internal.iter().any(|wrench| stress(wrench) > UNSTRESSED);
-    let is_open = inertia.cost_free > 0 && is_stressed && inertia.negative == 0;
-    (!is_open).then_some(Stability {
-        negative_modes: inertia.negative,
-        zero_modes: inertia.zero + inertia.symmetries,
-        symmetries: inertia.symmetries,
-    })
+/// Forces and moments of an equilibrium in the units of its scenario; NaN where the shape does not determine them.
+struct Forces {
+    internal: Vec<Wrench>,
+    reactions: Vec<Reaction>,
+    links: Vec<LinkForce>,
+    /// Names of the supports and links with undetermined components.
+    undetermined: Vec<String>,
 }
 
-fn reactions(
-    problem: &Problem,
-    program: &BeltProgram,
-    solution: &Solution<BeltPoint>,
-) -> Vec<Reaction> {
-    let units = problem.units();
-    let wrenches = program.reactions(&solution.at.point, &solution.at.multipliers.equalities);
-    let supports = problem.scenario().supports.iter().zip(wrenches);
-    supports
-        .map(|(support, wrench)| Reaction {
-            at: support.at.arc_length(units.length),
-            wrench: units.wrench(wrench),
-        })
-        .collect()
+impl Forces {
+    fn of(
+        problem: &Problem,
+        program: &BeltProgram,
+        solution: &Solution<BeltPoint>,
+        mut internal: Vec<(Vector3<f64>, Vector3<f64>)>,
+        status: Status,
+    ) -> Self {
+        let (scenario, units) = (problem.scenario(), problem.units());
+        let Stationary { point, multipliers } = &solution.at;
+        let mut wrenches = program.reactions(point, &multipliers.equalities);
+        let mut forces = program.link_forces(&multipliers.equalities);
+        wrenches.truncate(scenario.supports.len());
+        forces.truncate(scenario.links.len());
+        let mut names = Vec::new();
+        let undetermined = program.undetermined(point);
+        if let Some(undetermined) = undetermined.filter(|_| status == Status::Converged) {
+            undetermined.set(f64::NAN, &mut wrenches, &mut forces, &mut internal);
+            let is_nan = |vector: &Vector3<f64>| vector.iter().any(|part| part.is_nan());
+            let supports = wrenches.iter().enumerate();
+            let supports = supports.filter(|(_, (force, moment))| is_nan(force) || is_nan(moment));
+            names.extend(supports.map(|(i, _)| format!("supports[{i}]")));
+            let links = forces.iter().enumerate();
+            let links = links.filter(|(_, force)| is_nan(force));
+            names.extend(links.map(|(i, _)| format!("links[{i}]")));
+        }
+        let supports = scenario.supports.iter().zip(wrenches);
+        Self {
+            internal: internal.into_iter().map(|w| units.wrench(w)).collect(),
+            reactions: supports
+                .map(|(support, wrench)| Reaction {
+                    at: support.at.arc_length(units.length),
+                    wrench: units.wrench(wrench),
+                })
+                .collect(),
+            links: forces
+                .into_iter()
+                .map(|force| LinkForce {
+                    force: force * units.force(),
+                })
+                .collect(),
+            undetermined: names,
+        }
+    }
 }

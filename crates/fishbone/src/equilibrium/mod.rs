@@ -2,6 +2,7 @@
 
 mod accuracy;
 mod active_set;
+mod flat;
 pub(crate) mod guess;
 mod intrinsic;
 mod refinement;
@@ -52,14 +53,15 @@ pub struct Reaction {
     /// Arc length of the support from the start.
     pub at: f64,
     /// Force and moment on the belt about the support point: the gradient of the least energy by the support's
-    /// translation and left, world-axes rotation.
+    /// translation and left, world-axes rotation. A component is NaN where the shape does not determine it.
     pub wrench: Wrench,
 }
 
 /// The force of a link on the belt.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LinkForce {
-    /// Force on the belt at the link's point `to`, world axes; at `from` acts the opposite.
+    /// Force on the belt at the link's point `to`, world axes; at `from` acts the opposite. A component is NaN where the
+    /// shape does not determine it.
     pub force: Vector3<f64>,
 }
 
@@ -82,7 +84,8 @@ pub struct Equilibrium {
     pub spine: Spine,
     /// Torsion ω_η at every node.
     pub torsion: Vec<f64>,
-    /// Internal force and moment at every node, of the belt beyond on the part before; empty where the method has no forces.
+    /// Internal force and moment at every node, of the belt beyond on the part before; a component is NaN where the shape does
+    /// not determine it. Empty where the method has no forces.
     pub internal: Vec<Wrench>,
     /// Reaction of each support, in the order of the scenario; empty where the method has no forces.
     pub reactions: Vec<Reaction>,

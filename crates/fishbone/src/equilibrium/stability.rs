@@ -1,8 +1,10 @@
 //! Stability of an equilibrium by the second variation of the energy.
 
-use super::Equilibrium;
+use super::{Equilibrium, flat};
 use crate::problem::Problem;
 use crate::problem::program::{BeltPoint, BeltProgram, ROWS};
+use crate::strip::flat::FLAT;
+use nalgebra::Vector3;
 use stagewise::{Inertia, Outcome, Solution, Stationary, assess};
 
 /// The inertia of the second variation of the energy at an equilibrium, on the shapes that its supports and its active rib
@@ -44,8 +46,6 @@ pub(super) fn with_square_ribs(
     program: &BeltProgram,
     solution: Solution<BeltPoint>,
 ) -> Solution<BeltPoint> {
-    /// Bend up to which a node is flat, in 1/U.
-    const FLAT: f64 = 1e-9;
     let mut at = solution.at.clone();
     let is_flat = at.point.fields.iter().all(|fields| fields[0].abs() <= FLAT);
     if !is_flat || solution.outcome != Outcome::Converged {
@@ -65,15 +65,40 @@ pub(super) fn with_square_ribs(
     }
 }
 
-/// The inertia of a solution of a problem's programme, on all motions that its scenario leaves.
-pub(super) fn inertia(
+/// Stability of a solution by its second variation, on all motions that its scenario leaves; `None` where it is undecided.
+///
+/// Where a part of the belt is flat, every slope of its ribs costs the same. With these slopes held the second variation shows
+/// whether a belt without stress is stable. Under stress it can only show that the belt is not stable, and
+/// [`flat::decide`] goes on.
+pub(super) fn decide(
     problem: &Problem,
     program: &BeltProgram,
     solution: &Solution<BeltPoint>,
-) -> Option<Inertia> {
-    match left_free(problem, program, &solution.at) {
-        Some((program, at)) => assess(&program, problem.tolerance(), &at).inertia,
+    internal: &[(Vector3<f64>, Vector3<f64>)],
+) -> Option<Stability> {
+    /// Internal force and moment up to which a belt counts as unstressed, in mean R_f/U² and mean R_f/U.
+    const UNSTRESSED: f64 = 1e-6;
+    let free = left_free(problem, program, &solution.at);
+    let inertia = match &free {
+        Some((program, at)) => assess(program, problem.tolerance(), at).inertia,
         None => solution.inertia,
+    }?;
+    let stress = |(force, moment): &(Vector3<f64>, Vector3<f64>)| force.amax().max(moment.amax());
+    let is_stressed = internal.iter().any(|wrench| stress(wrench) > UNSTRESSED);
+    let is_open = inertia.cost_free > 0 && is_stressed && inertia.negative == 0;
+    match is_open {
+        true => flat::decide(program, problem.tolerance(), &solution.at),
+        false => Some(inertia.into()),
+    }
+}
+
+impl From<Inertia> for Stability {
+    fn from(inertia: Inertia) -> Self {
+        Self {
+            negative_modes: inertia.negative,
+            zero_modes: inertia.zero + inertia.symmetries,
+            symmetries: inertia.symmetries,
+        }
     }
 }
 

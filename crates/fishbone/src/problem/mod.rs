@@ -132,25 +132,23 @@ impl Problem {
         Self { origin, ..self }
     }
 
-    /// Checks a pose for a support as [`Self::with_support_pose`] does, without making the problem: nothing is allocated.
+    /// Checks a position and a rotation vector for a support as a scenario is checked, without making the problem: nothing is
+    /// allocated.
+    ///
+    /// Units: those of the scenario; rad.
     pub(crate) fn check_support_pose(
         &self,
         support: usize,
-        pose: &Pose,
+        position: &Vector3<f64>,
+        rotation: &Vector3<f64>,
     ) -> Result<(), ScenarioError> {
-        let moved = self.moved(support, pose)?;
+        let moved = self.held_at(support, position, rotation)?;
         self.scenario.check_support(support, &moved)
     }
 
     /// A support held at another pose.
     fn moved(&self, support: usize, pose: &Pose) -> Result<SupportSpec, ScenarioError> {
-        let Some(held) = self.scenario.supports.get(support) else {
-            return Err(ScenarioError::invalid(
-                format!("supports[{support}]"),
-                "nothing",
-                "a support of the scenario",
-            ));
-        };
+        let moved = self.held_at(support, &pose.position, &log(&pose.frame))?;
         if !is_rotation(&pose.frame) {
             return Err(ScenarioError::invalid(
                 format!("supports[{support}].rotation"),
@@ -158,9 +156,26 @@ impl Problem {
                 "a right-handed frame of columns of length 1 that are square to each other",
             ));
         }
+        Ok(moved)
+    }
+
+    /// A support held at another position and rotation vector.
+    fn held_at(
+        &self,
+        support: usize,
+        position: &Vector3<f64>,
+        rotation: &Vector3<f64>,
+    ) -> Result<SupportSpec, ScenarioError> {
+        let Some(held) = self.scenario.supports.get(support) else {
+            return Err(ScenarioError::invalid(
+                format!("supports[{support}]"),
+                "nothing",
+                "a support of the scenario",
+            ));
+        };
         Ok(SupportSpec {
-            position: Some([0, 1, 2].map(|i| Component::Held(pose.position[i]))),
-            rotation: Some(log(&pose.frame).into()),
+            position: Some([0, 1, 2].map(|i| Component::Held(position[i]))),
+            rotation: Some((*rotation).into()),
             euler: None,
             quaternion: None,
             ..held.clone()

@@ -5,6 +5,8 @@
 //! carried across a bend of the board, where the rib is one material line.
 
 mod derivatives;
+mod determinacy;
+mod flat;
 mod link;
 mod load;
 mod obstacle;
@@ -14,6 +16,8 @@ mod symmetries;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use determinacy::Undetermined;
+pub(crate) use flat::TwistingProgram;
 pub use link::{NodeLink, Tie};
 pub(crate) use load::weight;
 pub use load::{DeadForce, NodeLoad};

@@ -136,10 +136,34 @@ fn test_pose_that_no_support_may_have_is_refused() {
     for (support, pose, field) in cases {
         let refused = problem().with_support_pose(support, &pose).unwrap_err();
         assert_eq!(refused.field(), Some(field));
-        let checked = problem().check_support_pose(support, &pose);
+    }
+}
+
+#[test]
+fn test_position_and_rotation_vector_are_refused_as_by_a_scenario() {
+    let (level, here) = (Vector3::zeros(), Vector3::new(3.0, 0.0, 0.0));
+    let cases = [
+        (f64::NAN * here, level),
+        (f64::INFINITY * here, level),
+        (1e300 * here, level),
+        (1e7 * here, level),
+        (here, Vector3::new(0.0, f64::NAN, 0.0)),
+        (here, Vector3::new(0.0, 1e300, 0.0)),
+        (here, Vector3::new(0.0, -1.1e6, 0.0)),
+    ];
+    for (position, rotation) in cases {
+        let mut scenario = problem().scenario().clone();
+        let support = &mut scenario.supports[1];
+        support.position = Some([0, 1, 2].map(|i| Component::Held(position[i])));
+        support.rotation = Some(rotation.into());
+        (support.euler, support.quaternion) = (None, None);
+        let refused = scenario.validate().unwrap_err();
+        let checked = problem().check_support_pose(1, &position, &rotation);
         assert_eq!(checked, Err(refused));
     }
-    assert_eq!(problem().check_support_pose(1, &at(3.0, 1.0)), Ok(()));
+    let turned = Vector3::new(0.0, 7.0, 0.0);
+    assert_eq!(problem().check_support_pose(1, &here, &turned), Ok(()));
+    assert!(problem().check_support_pose(2, &here, &turned).is_err());
 }
 
 #[test]

@@ -126,7 +126,7 @@ impl EnergyModel {
 
     /// Power of 1+β² in the term in κ₁².
     #[inline(always)]
-    fn exponent(self) -> f64 {
+    pub(super) fn exponent(self) -> f64 {
         match self {
             Self::Fishbone => 2.5,
             Self::Sadowsky | Self::Wunderlich => 2.0,

@@ -6,6 +6,7 @@ pub mod density;
 pub mod developable;
 pub mod element;
 pub(crate) mod energy;
+pub(crate) mod flat;
 pub mod kernel;
 pub mod ribs;
 pub mod spine;

@@ -7,6 +7,7 @@ use super::curvature::curvature;
 use super::extremes::{Part, smooth_parts};
 use crate::board::feet::Board;
 use crate::board::outline::outline;
+use crate::strip::flat::FLAT;
 use crate::strip::spine::Spine;
 
 /// Cells in each smooth part of an element, a number: within a cell the curvature of the spine is taken as linear.
@@ -123,7 +124,12 @@ impl Cell {
         let [a, b] = [minus.v, plus.v].map(|v| (1.0 - v * s).max(0.0));
         let [c, d] = [from, to].map(|distance| {
             let (bend, slope) = spine.fields(element, distance);
-            curvature(bend, slope).abs()
+            let curvature = curvature(bend, slope).abs();
+            // Less is rounding of a solve.
+            match curvature * spine.length() > FLAT {
+                true => curvature,
+                false => 0.0,
+            }
         });
         Self {
             extent: (to - from) * (plus.v - minus.v),

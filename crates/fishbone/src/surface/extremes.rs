@@ -2,6 +2,7 @@
 
 use super::curvature::{bend_radius, curvature};
 use crate::board::feet::Board;
+use crate::strip::flat::FLAT;
 use crate::strip::ribs::rib_convergence_bound;
 use crate::strip::spine::{Spine, SpinePoint};
 use nalgebra::Vector3;
@@ -99,7 +100,8 @@ pub struct SpineRadius {
     pub u: f64,
 }
 
-/// The least radius of bend on the spine, 1/|κ₁|, between nodes too; `None` where the belt is flat all over.
+/// The least radius of bend on the spine, 1/|κ₁|, between nodes too; `None` where the belt is flat all over: where no radius
+/// is below 1e8 U, as bends below 1e-8/U are rounding of a solve.
 ///
 /// Over the whole width the radius falls with every refinement of the mesh, at the inflections of the spine; on the
 /// spine it converges.
@@ -122,7 +124,7 @@ pub fn least_spine_radius(spine: &Spine) -> Option<SpineRadius> {
         .map(at_node)
         .chain(spine.strips().flat_map(inside));
     let least = radii.min_by(|a, b| a.value.total_cmp(&b.value));
-    least.filter(|radius| radius.value.is_finite())
+    least.filter(|radius| radius.value * FLAT < spine.length())
 }
 
 fn node_curvature(spine: &Spine, node: usize) -> f64 {
@@ -171,10 +173,12 @@ fn turning_points(spine: &Spine, element: usize) -> Vec<f64> {
 /// Samples in each smooth piece from which the tightest bend is refined, a number.
 const SAMPLES: usize = 8;
 
-/// The least radius of bend over the whole width, (1 − v s)/|κ₁|; `None` where the belt is flat all over.
+/// The least radius of bend over the whole width, (1 − v s)/|κ₁|; `None` where the belt is flat all over, as for
+/// [`least_spine_radius`].
 ///
 /// The tightest point of a rib is the end towards which the ribs converge.
 pub fn least_bend_radius(spine: &Spine) -> Option<BendRadius> {
+    least_spine_radius(spine)?;
     let board = Board::of(spine);
     let parts = spine
         .strips()
