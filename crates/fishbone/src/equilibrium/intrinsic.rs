@@ -176,7 +176,7 @@ fn find(
     from: Start,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> (Found, Option<String>) {
-    let search = Search::of(problem);
+    let mut search = Search::of(problem);
     let MinimumSettings {
         cold_barrier,
         close_barrier,
@@ -184,7 +184,7 @@ fn find(
     } = search.settings;
     let uniform = || problem.program(problem.elements());
     let mut program = match from {
-        Start::Near(mesh, _) | Start::Minimum(mesh, _) => {
+        Start::Near(mesh, _) | Start::Minimum(mesh, _) | Start::Close(mesh, _) => {
             problem.program_on(mesh).unwrap_or_else(uniform)
         }
         _ => uniform(),
@@ -193,7 +193,7 @@ fn find(
         let start = match from {
             Start::Guess => Some(None),
             Start::Shape(shape) | Start::Minimum(_, shape) => Some(Some((&program, shape))),
-            Start::Near(..) | Start::Close(_) => None,
+            Start::Near(..) | Start::Close(..) => None,
         };
         if let Some(start) = start {
             return refine(problem, &search, start, proceed).into();
@@ -202,7 +202,9 @@ fn find(
     let solution = match from {
         Start::Near(_, shape) => search.from(&program, shape.clone(), proceed),
         Start::Shape(shape) => search.only_from(&program, shape.clone(), cold_barrier, proceed),
-        Start::Close(shape) | Start::Minimum(_, shape) => {
+        Start::Close(_, shape) | Start::Minimum(_, shape) => {
+            // Other active sets do not lead away either.
+            search.settings.warm_barrier = close_barrier;
             search.only_from(&program, shape.clone(), close_barrier, proceed)
         }
         Start::Guess => {

@@ -30,6 +30,7 @@ use std::sync::OnceLock;
 use thiserror::Error;
 
 pub(crate) use intrinsic::of_solution;
+pub(crate) use search::{prolonged, prolonged_with_multipliers};
 
 named! {
     /// How a solve ended.
@@ -261,8 +262,8 @@ enum Start<'a> {
     Minimum(&'a Mesh, &'a BeltPoint),
     /// At a shape that need not be near to a minimum, and nowhere else.
     Shape(&'a BeltPoint),
-    /// At a shape very near to a minimum, and nowhere else.
-    Close(&'a BeltPoint),
+    /// On a mesh, at a shape very near to a minimum, and nowhere else.
+    Close(&'a Mesh, &'a BeltPoint),
 }
 
 /// The equilibrium of a problem that is found from the guess.
@@ -323,5 +324,16 @@ pub(crate) fn minimum_next_to(
     shape: &BeltPoint,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Equilibrium {
-    intrinsic::solve(problem, Start::Close(shape), proceed)
+    let mesh = Mesh::uniform(problem, problem.elements());
+    minimum_next_to_on(problem, &mesh, shape, proceed)
+}
+
+/// The minimum next to a shape on a mesh, whatever its active sets.
+pub(crate) fn minimum_next_to_on(
+    problem: &Problem,
+    mesh: &Mesh,
+    shape: &BeltPoint,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Equilibrium {
+    intrinsic::solve(problem, Start::Close(mesh, shape), proceed)
 }
