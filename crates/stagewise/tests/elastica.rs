@@ -418,45 +418,6 @@ fn test_column_loses_its_stability_at_eulers_loads() {
     assert!(modes[1].eigenvalue < 0.0 && modes[2].eigenvalue > 0.0);
 }
 
-/// A column under a load that falls to either side of the parameter 0, from above Euler's load: its bent shapes to one side and
-/// to the other are one closed curve.
-struct Eased;
-
-impl Family<3, 1, 4> for Eased {
-    type Point = Shape;
-    type Program = Rod;
-
-    fn at(&self, p: f64) -> Option<Rod> {
-        let euler = (0.5 * PI).powi(2);
-        let load = euler * (1.1 - p * p);
-        Some(Rod { end: None, load })
-    }
-}
-
-#[test]
-fn test_a_closed_curve_ends_where_it_began() {
-    let start = solved(&Eased.at(0.0).unwrap());
-    let pace = Pace {
-        longest: 0.05,
-        stations: 1000,
-        events: Events::Ignore,
-    };
-    let continuation = Continuation::new(&Eased, 1e-9, [-1.0, 1.0], pace);
-    let start = continuation.start(&start.at, 0.0, true).unwrap();
-    let curve = continuation.trace(start, &mut |_| ControlFlow::<()>::Continue(()));
-    assert_eq!(curve.end, End::Closed);
-    let parameters: Vec<f64> = curve.stations.iter().map(|s| s.parameter).collect();
-    assert!(parameters.len() < 300, "{}", parameters.len());
-    assert_eq!(parameters.first(), parameters.last());
-    // The column is straight at Euler's load, at p² = 0.1.
-    for farthest in [
-        parameters.iter().copied().fold(0.0, f64::max),
-        -parameters.iter().copied().fold(0.0, f64::min),
-    ] {
-        assert!((farthest - 0.1f64.sqrt()).abs() < 0.01, "{farthest}");
-    }
-}
-
 #[test]
 fn test_a_curve_ends_for_the_callers_own_reason() {
     #[derive(Debug, PartialEq)]

@@ -43,15 +43,14 @@ pub(super) fn is_confirmed(
         stations: STATES,
         ..pace
     };
-    let (found, _) = trace(
-        &fine,
-        start,
-        pace,
-        &mut |station| match off(station) * onwards > SAME_PLACE {
-            true => ControlFlow::Break(()),
-            false => proceed(station),
-        },
-    );
+    // A branch that has turned back passes its start again.
+    let window = off(&start) * onwards - SAME_PLACE..=SAME_PLACE;
+    let (found, _) = trace(&fine, start, pace, &mut |station| match window
+        .contains(&(off(station) * onwards))
+    {
+        true => proceed(station),
+        false => ControlFlow::Break(()),
+    });
     let Some(here) = family.shape_on(&event.station, &fine) else {
         return false;
     };
