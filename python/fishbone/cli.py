@@ -307,7 +307,8 @@ def follow(  # noqa: PLR0913 - one for each option
     if table is not None:
         contents[table] = encode_table(diagram.table())
     if figure is not None:
-        contents[figure] = plot.encode(diagram, figure.suffix, radius_limit=radius_limit)
+        limit = {} if radius_limit is None else {"radius_limit": radius_limit}
+        contents[figure] = plot.encode(diagram, figure.suffix, **limit)
     _write_all(contents)
     if as_json:
         click.echo(text, nl=False)
