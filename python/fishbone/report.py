@@ -303,7 +303,7 @@ def _events(diagram: Diagram) -> Table:
     for heading in ("branch", "event"):
         table.add_column(heading)
     has_angle = diagram.angle(0.0) is not None
-    headings = ("negative modes", "energy", "after the snap", "snap moves by", "snap releases")
+    headings = ("negative", "energy", "snaps to", "moves by")
     for heading in ("parameter", *(["angle"] if has_angle else []), *headings):
         table.add_column(heading, justify="right")
     for index, branch in enumerate(diagram.branches):
@@ -317,5 +317,5 @@ def _events(diagram: Diagram) -> Table:
 
 def _event(event: Event, energy: float) -> list[str]:
     before, after = event.negative_modes
-    snap = [] if event.snapped is None else [event.snapped.energy, event.jump, event.released]
+    snap = [] if event.snapped is None else [event.snapped.energy, event.jump]
     return [f"{before} → {after}", number(energy), *map(number, snap)]
