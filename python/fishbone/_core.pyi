@@ -144,10 +144,24 @@ class Diagram:
     def negative_modes(self, branch: int) -> list[int]: ...
     def events(
         self, branch: int
-    ) -> list[tuple[Kind, float, int, tuple[int, int], tuple[float, Scenario, Equilibrium] | None]]: ...
+    ) -> list[
+        tuple[Kind, float, int, tuple[int, int], bool, tuple[float, Scenario, Equilibrium, float, float] | None]
+    ]: ...
     def report(
         self, branch: int
-    ) -> tuple[_Floats, _Floats, _Floats, _Floats, _Floats, _Floats, _Floats, _Floats, list[bool | None]]: ...
+    ) -> tuple[
+        _Floats,
+        _Floats,
+        _Floats,
+        _Floats,
+        _Floats,
+        _Floats,
+        _Floats,
+        _Floats,
+        list[bool | None],
+        list[Status],
+        _Floats,
+    ]: ...
     def positions(self, branch: int) -> list[_Floats]: ...
     def equilibrium(self, branch: int, state: int) -> tuple[Scenario, Equilibrium]: ...
 
@@ -172,7 +186,7 @@ class Sensitivity:
 @final
 class Tracker:
     def __new__(cls, equilibrium: Equilibrium, support: int) -> Self: ...
-    def update(self, position: _Row, rotation: _Row) -> tuple[Status, bool, float, int, float]: ...
+    def update(self, position: _Row, rotation: _Row) -> tuple[Status, bool, float, int, float, float, float]: ...
     def equilibrium(self) -> tuple[Scenario, Equilibrium]: ...
     @property
     def energy(self) -> float: ...
@@ -194,6 +208,7 @@ def follow(
     step: float,
     states: int,
     branches: int,
+    snaps: bool,
     progress: Callable[[int, float], object] | None = None,
 ) -> Diagram: ...
 def branches(

@@ -12,11 +12,12 @@ from matplotlib.lines import Line2D
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    import numpy.typing as npt
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
     from fishbone.equilibrium import Equilibrium
-    from fishbone.follow import Branch, Diagram
+    from fishbone.follow import Branch, Diagram, Event
     from fishbone.names import Kind, Place
 
     Floats = NDArray[np.float64]
@@ -34,6 +35,7 @@ MARKERS: dict[Kind, Style] = {
     "pitchfork": {"marker": "^", "markerfacecolor": "black", **_MARKER},
     "transcritical": {"marker": "X", "markerfacecolor": "0.6", **_MARKER},
     "bifurcation": {"marker": "s", "markerfacecolor": "0.6", **_MARKER},
+    "edges": {"marker": "|", **_MARKER},
 }
 SNAP: Style = {
     "arrowstyle": "-|>",
@@ -45,6 +47,7 @@ SNAP: Style = {
 }
 SHORTEST_SNAP = 0.02
 """Length, as a share of an axis, below which an arrow is not drawn: there another branch continues without a jump."""
+LIMIT: Style = {"color": "firebrick", "linestyle": "-.", "linewidth": 0.9}
 LANDED: Style = {"linestyle": "", "marker": ".", "markersize": 4.0, "color": "0.35", "zorder": 3}
 MAX_NAMED = 10
 """Greatest number of branches in the key: the colours of more branches are not distinguishable."""
@@ -53,17 +56,28 @@ COLORS = ("viridis", 0.1, 0.8)
 
 
 class Panel(NamedTuple):
-    """A quantity drawn over the parameter."""
+    """A quantity drawn over the parameter, or over the angle along poses that have one."""
 
     label: str
     along: Callable[[Branch], Floats]
     """The values of the quantity in the states of a branch."""
     at: Callable[[Equilibrium], float]
     """The value of the quantity in an equilibrium."""
+    limit: float | None = None
+    """A value at which a line is drawn."""
 
 
-def panels(diagram: Diagram, support: Place | None) -> Iterator[Panel]:
+def places(diagram: Diagram, parameter: npt.ArrayLike) -> Floats:
+    """The places on the axis of a diagram: the angle in degrees where the path has one, else the parameter."""
+    angle = diagram.angle(parameter)
+    return np.asarray(parameter) if angle is None else angle
+
+
+def panels(diagram: Diagram, support: Place | None, limit: float | None) -> Iterator[Panel]:
     """Panels of energy, height, the force of a support if there is one, tightest bend on the spine, and rib margin.
+
+    The tightest bend is shown as its radius along an angle, and where the radius has a limit, else as its inverse,
+    which is 0 where the belt is flat.
 
     Errors: `NoSupport`.
     """
@@ -80,17 +94,30 @@ def panels(diagram: Diagram, support: Place | None) -> Iterator[Panel]:
             lambda branch: np.linalg.norm(branch.reaction(index).force, axis=1),
             lambda shape: float(np.linalg.norm(shape.reaction(index).force)),
         )
-    yield Panel(
-        "tightest bend\n[1/length]",
-        lambda branch: np.nan_to_num(1.0 / branch.least_spine_radius),
-        lambda shape: 0.0 if shape.least_spine_radius is None else 1.0 / shape.least_spine_radius.value,
+    yield (
+        _radius(limit)
+        if limit is not None or diagram.angle(0.0) is not None
+        else Panel(
+            "tightest bend\n[1/length]",
+            lambda branch: np.nan_to_num(1.0 / branch.least_spine_radius),
+            lambda shape: 0.0 if shape.least_spine_radius is None else 1.0 / shape.least_spine_radius.value,
+        )
     )
     yield Panel("rib margin\n[1/length]", lambda branch: branch.rib_margin, lambda shape: float(shape.rib_margin.value))
 
 
+def _radius(limit: float | None) -> Panel:
+    return Panel(
+        "least radius\n[length]",
+        lambda branch: branch.least_spine_radius,
+        lambda shape: np.nan if shape.least_spine_radius is None else shape.least_spine_radius.value,
+        limit,
+    )
+
+
 def draw(axes: Axes, diagram: Diagram, panel: Panel) -> bool:
     """Draws a quantity over the parameter: branches, events and snaps; returns whether an arrow of a snap is drawn."""
-    curves = [np.column_stack([branch.parameter, panel.along(branch)]) for branch in diagram.branches]
+    curves = [np.column_stack([places(diagram, branch.parameter), panel.along(branch)]) for branch in diagram.branches]
     for branch, curve, color in zip(diagram.branches, curves, colors(diagram), strict=True):
         for states, is_stable in runs(branch):
             axes.plot(*curve[states].T, color=color, **LINES[is_stable][1])
@@ -99,8 +126,10 @@ def draw(axes: Axes, diagram: Diagram, panel: Panel) -> bool:
             event = diagram.branches[branch.origin.branch].events[branch.origin.event]
             root = np.array([curves[branch.origin.branch][event.state], curve[0]])
             axes.plot(*root.T, color=color, **LINES[branch.stable[0]][1])
-        for event in branch.events:
+        for event in filter(_is_drawn, branch.events):
             axes.plot(*curve[event.state], **MARKERS[event.kind])
+    if panel.limit is not None:
+        axes.axhline(panel.limit, **LIMIT)
     axes.set(ylabel=panel.label)
     axes.grid(visible=True, color="0.9", linewidth=0.5)
     snaps = list(_snaps(diagram, panel, curves))
@@ -141,16 +170,18 @@ def colors(diagram: Diagram) -> list[Any]:
     return list(mpl.colormaps[name](np.linspace(darkest, lightest, len(diagram.branches))))
 
 
-def key(diagram: Diagram, *, snaps: bool) -> Iterator[Line2D]:
+def key(diagram: Diagram, *, snaps: bool, limit: bool) -> Iterator[Line2D]:
     """The key of the lines, markers and arrows in the picture."""
     stretches = {is_stable for branch in diagram.branches for _, is_stable in runs(branch)}
-    kinds = {event.kind for branch in diagram.branches for event in branch.events}
+    kinds = {event.kind for branch in diagram.branches for event in filter(_is_drawn, branch.events)}
     for is_stable, (label, style) in LINES.items():
         if is_stable in stretches:
             yield Line2D([], [], label=label, color="black", **style)
     for kind, style in MARKERS.items():
         if kind in kinds:
             yield Line2D([], [], label=kind, **style)
+    if limit:
+        yield Line2D([], [], label="limit", **LIMIT)
     if snaps:
         yield Line2D([], [], label="snap", color=SNAP["color"], linestyle="", marker="$→$", markersize=9.0)
     if 1 < len(diagram.branches) <= MAX_NAMED:
@@ -164,6 +195,11 @@ def _snaps(
     """The points before and after each snap."""
     for branch, curve in zip(diagram.branches, curves, strict=True):
         for event in branch.events:
-            if event.snapped is not None and event.snapped_parameter is not None:
-                parameter, before = curve[event.state].tolist()
-                yield (parameter, before), (event.snapped_parameter, panel.at(event.snapped))
+            if _is_drawn(event) and event.snapped is not None and event.snapped_parameter is not None:
+                place, before = curve[event.state].tolist()
+                yield (place, before), (float(places(diagram, event.snapped_parameter)), panel.at(event.snapped))
+
+
+def _is_drawn(event: Event) -> bool:
+    """Whether an event is one of the belt, as far as a finer mesh tells."""
+    return event.confirmed

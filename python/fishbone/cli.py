@@ -246,6 +246,7 @@ def _warn(file: Path, equilibria: list[Equilibrium]) -> None:
 @click.option("--step", type=float, default=0.05, show_default=True, help="Greatest step length along a branch.")
 @click.option("--states", type=int, default=1000, show_default=True, help="Greatest number of states of a branch.")
 @click.option("--branches", type=int, default=10, show_default=True, help="Greatest number of branches.")
+@click.option("--snaps", is_flag=True, help="Follow the minima that the belt snaps to, too.")
 @click.option("--out", type=_PATH, callback=_output(".json"), help="Write all states: .json.")
 @click.option("--table", type=_PATH, callback=_output(".csv"), help="Write a report on all states: .csv.")
 @click.option(
@@ -254,6 +255,7 @@ def _warn(file: Path, equilibria: list[Equilibrium]) -> None:
     callback=_output(".png", ".pdf", ".svg"),
     help="Draw energy, height and force along the path: .png, .pdf or .svg.",
 )
+@click.option("--radius-limit", type=float, metavar="R", help="Draw a line at this bend radius into --figure.")
 @click.option("--json", "as_json", is_flag=True, help="Print all states as JSON instead of tables.")
 def follow(  # noqa: PLR0913 - one for each option
     file: Path,
@@ -265,9 +267,11 @@ def follow(  # noqa: PLR0913 - one for each option
     step: float,
     states: int,
     branches: int,
+    snaps: bool,
     out: Path | None,
     table: Path | None,
     figure: Path | None,
+    radius_limit: float | None,
     as_json: bool,
 ) -> None:
     """Follow an equilibrium along a path.
@@ -284,7 +288,9 @@ def follow(  # noqa: PLR0913 - one for each option
     scenario = fishbone.load(file)
     try:
         with _progress(lambda branch, share: (f"branch {branch}", share, 1.0)) as progress:
-            diagram = fishbone.follow(scenario, path, step=step, states=states, branches=branches, progress=progress)
+            diagram = fishbone.follow(
+                scenario, path, step=step, states=states, branches=branches, snaps=snaps, progress=progress
+            )
     except NoBranch as error:
         raise NoEquilibrium(f"{file}: {' '.join(str(error).split())}") from error
     with _progress(lambda branch, count: ("reporting", branch, max(count, 1))) as progress:
@@ -301,7 +307,8 @@ def follow(  # noqa: PLR0913 - one for each option
     if table is not None:
         contents[table] = encode_table(diagram.table())
     if figure is not None:
-        contents[figure] = plot.encode(diagram, figure.suffix)
+        limit = {} if radius_limit is None else {"radius_limit": radius_limit}
+        contents[figure] = plot.encode(diagram, figure.suffix, **limit)
     _write_all(contents)
     if as_json:
         click.echo(text, nl=False)

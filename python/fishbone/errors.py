@@ -72,6 +72,8 @@ class NoMargin(FishboneError):  # noqa: N818
         Literal[
             "no_multipliers",
             "not_converged",
+            "taut",
+            "flat",
             "singular",
             "not_stable",
             "not_clamped",
@@ -136,9 +138,10 @@ class NoPath(FishboneError, ValueError):  # noqa: N818
 class NoBranch(FishboneError):  # noqa: N818
     """There is no equilibrium to follow, or more than one branch continues it."""
 
-    reason: Literal["no_multipliers", "not_converged", "singular"] | None = None
-    """The reason: the source's method has no multipliers; the solve has not converged; or the equilibrium is singular,
-    so that no single branch continues it."""
+    reason: Literal["no_multipliers", "not_converged", "taut", "flat", "singular"] | None = None
+    """The reason: the source's method has no multipliers; the solve has not converged; the supports leave no slack; the
+    belt is flat and may leave its plane in many ways; or the equilibrium is singular, so that no single branch
+    continues it."""
     solve_message: str | None = None
     """The message of the solve that has not converged."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 import re
 from collections.abc import Iterable, Mapping
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     from numpy.typing import NDArray
 
-    from fishbone.names import End, Kind, Place
+    from fishbone.names import End, Kind, Place, Status
 
     Floats = NDArray[np.float64]
     Columns = dict[str, NDArray[Any]]
@@ -59,14 +60,15 @@ class Origin(NamedTuple):
 
 
 class Event(NamedTuple):
-    """A place on a branch where the number of negative modes changes."""
+    """A place on a branch where the number of negative modes changes, or where other edges hold the ribs."""
 
     kind: Kind
     """The kind of event.
 
     At a "fold" the branch turns back. At a "pitchfork" the branch meets another branch that is its own mirror image, or
     that turns back there. At a "transcritical" event it crosses another branch at an angle. At a "bifurcation" the
-    other branches could not be followed.
+    other branches could not be followed. At "edges" the ribs beside a bend of the board come to other edges, and the
+    branch goes on.
     """
     parameter: float
     """The parameter of the event; the diagram's `parameter_name` names it."""
@@ -78,6 +80,16 @@ class Event(NamedTuple):
     """The minimum to which the belt goes past the loss of its stability, if one was found."""
     snapped_parameter: float | None
     """The parameter of `snapped`, a little past the event."""
+    confirmed: bool = True
+    """Whether the event is found again on a mesh of elements half as long, within 0.01 of the path or of its leg.
+
+    If not, it may be an event of the mesh, not of the belt.
+    """
+    jump: float = 0.0
+    """Largest displacement of a node in the snap; 0 without one. Jumps of less than `solver.snap_size` widths are no
+    snaps."""
+    released: float = 0.0
+    """Energy released in the snap, in the unit of the scenario."""
 
 
 class _Report(NamedTuple):
@@ -92,6 +104,8 @@ class _Report(NamedTuple):
     least_spine_radius: Floats
     rib_margin: Floats
     stable: list[bool | None]
+    status: list[Status]
+    residual: Floats
 
 
 class Branch:
@@ -112,8 +126,9 @@ class Branch:
         path."""
         self.end: End = inner.end(index)
         """The reason of the end of the branch: the path ends ("range"); the branch meets another branch head on
-        ("event"), or its own start ("closed"); the belt is drawn straight and has no slack left ("taut"); the set of
-        active edges beside a bend changes ("edges"); the `states` of `follow` are used up ("budget"); or no step,
+        ("event"), or its own start ("closed"); the belt is drawn straight and has no slack left ("taut"); the ribs
+        beside a bend come to other edges, with which no equilibrium is found ("edges"); the `states` of `follow` are
+        used up ("budget"); or no step,
         however short, converges ("lost")."""
         self.events: list[Event] = [_event(*event) for event in inner.events(index)]
         """The events of the branch in order."""
@@ -161,6 +176,19 @@ class Branch:
         of the ribs costs no energy, and `negative_modes` does not include it.
         """
         return list(self._report.stable)
+
+    @property
+    def status(self) -> list[Status]:
+        """The status of each state, as `Equilibrium.status`: all are "converged" but those that miss the tolerance."""
+        return list(self._report.status)
+
+    @property
+    def residual(self) -> Floats:
+        """Largest residual of each state, lengths in U and energy in mean R_f/U.
+
+        Shapes: (m,).
+        """
+        return self._report.residual.copy()
 
     @property
     def least_bend_radius(self) -> Floats:
@@ -230,7 +258,14 @@ class Branch:
 class Diagram:
     """The branches of equilibria that are connected along a path."""
 
-    def __init__(self, inner: _core.Diagram, start: Equilibrium, parameter_name: str, support: int | None) -> None:
+    def __init__(
+        self,
+        inner: _core.Diagram,
+        start: Equilibrium,
+        parameter_name: str,
+        support: int | None,
+        angles: Floats | None = None,
+    ) -> None:
         self.start = start
         """The equilibrium at the start of the path."""
         self.parameter_name = parameter_name
@@ -239,6 +274,7 @@ class Diagram:
         last = len(start._inner.reactions) - 1  # noqa: SLF001 - of this package
         self.support = support if support is not None else last if last >= 0 else None
         """Index of the support that the path moves, or else of the last support; None where there is no support."""
+        self._angles = angles
         self.branches = [Branch(inner, index, start) for index in range(inner.branches)]
         """The branch of `start`, then the branches that leave it, in the order found."""
 
@@ -247,17 +283,34 @@ class Diagram:
         """The scenario at the start of the path."""
         return self.start.scenario
 
+    def angle(self, parameter: npt.ArrayLike) -> Floats | None:
+        """The angle in degrees by which the support has turned from its first pose, at places on the path.
+
+        None of paths other than poses that turn about one axis. Turns like that of the first leg are positive.
+
+        Shapes: that of `parameter`.
+        """
+        if self._angles is None:
+            return None
+        return np.asarray(
+            np.interp(np.asarray(parameter, dtype=np.float64), np.arange(len(self._angles)), self._angles),
+            dtype=np.float64,
+        )
+
     def table(self) -> Columns:
         """A table of all states of all branches, as columns: for `pandas.DataFrame(…)` or a CSV file.
 
         The columns are branch, state, parameter, energy, height, stable, negative_modes, event (its kind, or empty),
-        supports[0].force.x … supports[k].moment.z, least_bend_radius, least_spine_radius, rib_margin. Where nothing
-        bends the radii are NaN.
+        supports[0].force.x … supports[k].moment.z, least_bend_radius, least_spine_radius, rib_margin, status, residual,
+        confirmed (of the event; True without one), and angle along poses that have one. Where nothing bends the radii
+        are NaN.
 
         Shapes: (number of states,) each.
         """
         tables = [_columns(index, branch) for index, branch in enumerate(self.branches)]
-        return {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
+        columns = {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
+        angle = self.angle(columns["parameter"])
+        return columns if angle is None else columns | {"angle": angle}
 
     def to_dict(self) -> dict[str, Any]:
         """The diagram as plain numbers, lists and text, schema "fishbone.diagram/1", with the results of all states."""
@@ -281,6 +334,7 @@ def follow(  # noqa: PLR0913 - keywords all but two
     step: float = 0.05,
     states: int = 1000,
     branches: int = 10,
+    snaps: bool = False,
     progress: Callable[[int, float], object] | None = None,
 ) -> Diagram:
     """Follows an equilibrium along a path, through folds and instabilities, and the branches that leave it.
@@ -292,8 +346,10 @@ def follow(  # noqa: PLR0913 - keywords all but two
 
     `step` is the greatest length of a step along a branch: the norm of the change of the parameter, which runs from 0
     to 1 or to the number of poses, and of the motion of the belt in U. `states` is the greatest number of states of a
-    branch, `branches` the greatest number of branches. `progress(branch, share of the path)` is called from the calling
-    thread during the continuation; the share falls where a branch has turned back. Other threads run meanwhile, and
+    branch, `branches` the greatest number of branches. With `snaps` the minima to which the belt snaps at confirmed
+    events are followed too, each as a branch that begins at its event. `progress(branch, share of the path)` is called
+    from the calling thread during the continuation; the share falls where a branch has turned back. Other threads run
+    meanwhile, and
     Ctrl-C ends the continuation.
 
     Errors: `NoPath` where the scenario has no such numbers, where nothing changes, and where the scenario at the end
@@ -310,8 +366,8 @@ def follow(  # noqa: PLR0913 - keywords all but two
         # An invalid path is refused before a long solve.
         way = _changed(scenario if isinstance(scenario, Scenario) else scenario.scenario, path)
         start = _solved(scenario)
-    inner = _core.follow(start._inner, way.inner, float(step), int(states), int(branches), progress)  # noqa: SLF001
-    return Diagram(inner, start, way.parameter_name, way.support)
+    inner = _core.follow(start._inner, way.inner, float(step), int(states), int(branches), bool(snaps), progress)  # noqa: SLF001
+    return Diagram(inner, start, way.parameter_name, way.support, way.angles)
 
 
 # ------------------------------------------------------------------------------------------------------- the path
@@ -323,6 +379,8 @@ class _Way(NamedTuple):
     inner: _core.Path
     parameter_name: str
     support: int | None
+    angles: Floats | None = None
+    """Of poses that turn about one axis: the angle at each of them in degrees, 0 at the first."""
 
 
 def _changed(scenario: Scenario, path: Mapping[str, Any]) -> _Way:
@@ -372,7 +430,43 @@ def _led(start: Equilibrium, path: Poses) -> _Way:
     # The source's method has no reactions, and the core refuses it whatever the support.
     support = _index_of(start, path.support) if start._inner.reactions else 0  # noqa: SLF001 - of this package
     inner = _core.Path.poses(start.scenario._inner, support, poses, path.motion)  # noqa: SLF001 - of this package
-    return _Way(inner, "place on the path", support)
+    turns = [_turn(rotation) for _, rotation in poses]
+    return _Way(inner, "place on the path", support, _angles([_frame_at(start, support), *turns]))
+
+
+def _frame_at(start: Equilibrium, support: int) -> Floats:
+    """The frame at a support."""
+    at = start.scenario.to_dict()["supports"][support]["at"]
+    node = {"start": 0, "end": -1}.get(at)
+    frame: Floats = start.frame[int(np.argmin(np.abs(start.u - at))) if node is None else node]
+    return frame
+
+
+def _turn(rotation: Sequence[float]) -> Floats:
+    """The rotation matrix of a rotation vector."""
+    angle = float(np.linalg.norm(rotation))
+    x, y, z = np.asarray(rotation) / angle if angle > 0.0 else np.zeros(3)
+    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    turn: Floats = np.eye(3) + math.sin(angle) * skew + (1.0 - math.cos(angle)) * skew @ skew
+    return turn
+
+
+def _angles(turns: Sequence[Floats]) -> Floats | None:
+    """The angles in degrees from the first of several rotation matrices; None unless all turns have one axis."""
+    parallel = 1e-6
+    axis: Floats | None = None
+    angles = [0.0]
+    for before, after in itertools.pairwise(turns):
+        turn = after @ before.T
+        sine = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
+        size = float(np.linalg.norm(sine))
+        if size > parallel and axis is None:
+            axis = sine / size
+        if size > parallel and axis is not None and np.linalg.norm(np.cross(axis, sine)) > parallel * size:
+            return None
+        sign = 1.0 if axis is None or sine @ axis >= 0.0 else -1.0
+        angles.append(angles[-1] + sign * math.degrees(math.atan2(size, 0.5 * (np.trace(turn) - 1.0))))
+    return None if axis is None else np.array(angles)
 
 
 def _solved(scenario: Scenario | Equilibrium) -> Equilibrium:
@@ -409,25 +503,26 @@ def _index_of(start: Equilibrium, support: Place) -> int:
 # ----------------------------------------------------------------------------------------------------- the results
 
 
-def _event(
+def _event(  # noqa: PLR0913, PLR0917 - as the core gives them
     kind: Kind,
     parameter: float,
     state: int,
     negative_modes: tuple[int, int],
-    snapped: tuple[float, _core.Scenario, _core.Equilibrium] | None,
+    confirmed: bool,  # noqa: FBT001 - by the core
+    snapped: tuple[float, _core.Scenario, _core.Equilibrium, float, float] | None,
 ) -> Event:
     if snapped is None:
-        return Event(kind, parameter, state, negative_modes, None, None)
-    place, scenario, found = snapped
+        return Event(kind, parameter, state, negative_modes, None, None, confirmed)
+    place, scenario, found, jump, released = snapped
     equilibrium = Equilibrium(Scenario._wrap(scenario), found)  # noqa: SLF001 - of this package
-    return Event(kind, parameter, state, negative_modes, equilibrium, place)
+    return Event(kind, parameter, state, negative_modes, equilibrium, place, confirmed, jump, released)
 
 
 def _columns(index: int, branch: Branch) -> Columns:
     count = len(branch)
-    kinds = [""] * count
+    kinds, confirmed = [""] * count, [True] * count
     for event in branch.events:
-        kinds[event.state] = event.kind
+        kinds[event.state], confirmed[event.state] = event.kind, event.confirmed
     columns: Columns = {
         "branch": np.full(count, index),
         "state": np.arange(count),
@@ -446,11 +541,15 @@ def _columns(index: int, branch: Branch) -> Columns:
         "least_bend_radius": branch.least_bend_radius,
         "least_spine_radius": branch.least_spine_radius,
         "rib_margin": branch.rib_margin,
+        "status": np.array(branch.status),
+        "residual": branch.residual,
+        "confirmed": np.array(confirmed),
     }
 
 
 def _branch_to_dict(branch: Branch) -> dict[str, Any]:
     parameter, negative_modes = branch.parameter.tolist(), branch.negative_modes.tolist()
+    status, residual = branch.status, branch.residual.tolist()
     return {
         "origin": None if branch.origin is None else branch.origin._asdict(),
         "end": branch.end,
@@ -459,6 +558,8 @@ def _branch_to_dict(branch: Branch) -> dict[str, Any]:
             {
                 "parameter": parameter[state],
                 "negative_modes": negative_modes[state],
+                "status": status[state],
+                "residual": residual[state],
                 "result": branch.equilibrium(state).to_dict(),
             }
             for state in range(len(branch))
@@ -469,11 +570,17 @@ def _branch_to_dict(branch: Branch) -> dict[str, Any]:
 def _event_to_dict(event: Event) -> dict[str, Any]:
     snapped = None
     if event.snapped is not None:
-        snapped = {"parameter": event.snapped_parameter, "result": event.snapped.to_dict()}
+        snapped = {
+            "parameter": event.snapped_parameter,
+            "jump": event.jump,
+            "released": event.released,
+            "result": event.snapped.to_dict(),
+        }
     return {
         "kind": event.kind,
         "parameter": event.parameter,
         "state": event.state,
         "negative_modes": list(event.negative_modes),
+        "confirmed": event.confirmed,
         "snapped": snapped,
     }

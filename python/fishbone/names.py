@@ -19,7 +19,7 @@ Place: TypeAlias = Literal["start", "end"] | float
 """A support: by its index (int) or its place, an end of the belt or an arc length (float)."""
 Motion: TypeAlias = Literal["straight", "screw"]
 """The motion of a support from one pose to the next."""
-Kind: TypeAlias = Literal["fold", "pitchfork", "transcritical", "bifurcation"]
+Kind: TypeAlias = Literal["fold", "pitchfork", "transcritical", "bifurcation", "edges"]
 """The kind of an event on a branch."""
 End: TypeAlias = Literal["range", "event", "closed", "budget", "lost", "edges", "taut"]
 """The reason of the end of a branch; "taut": the belt is drawn straight and has no slack left."""

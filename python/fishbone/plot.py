@@ -157,8 +157,11 @@ def overview(equilibria: Sequence[Equilibrium], viewer: ArrayLike = VIEWER) -> F
         return _draw_overview(equilibria, viewer)
 
 
-def diagram(diagram: Diagram, support: Place | None = None) -> Figure:
+def diagram(diagram: Diagram, support: Place | None = None, *, radius_limit: float | None = None) -> Figure:
     """Energy, height, force of a support, tightest bend and rib margin over the parameter.
+
+    Along poses that turn about one axis the parameter is the angle in degrees, and the tightest bend is shown as the
+    least radius; `radius_limit` draws a line at a radius. Events that a finer mesh does not confirm are left out.
 
     Lines are solid for stable states, dashed for unstable and dotted for undecided states. Markers are the events;
     arrows lead from the loss of stability to the minimum after the snap. `support` is named as for
@@ -168,10 +171,12 @@ def diagram(diagram: Diagram, support: Place | None = None) -> Figure:
     Errors: `NoSupport`.
     """
     with mpl.rc_context(_STYLE):
-        return _draw_diagram(diagram, support)
+        return _draw_diagram(diagram, support, radius_limit)
 
 
-def encode(subject: Equilibrium | Sequence[Equilibrium] | Diagram, suffix: str) -> bytes:
+def encode(
+    subject: Equilibrium | Sequence[Equilibrium] | Diagram, suffix: str, *, radius_limit: float | None = None
+) -> bytes:
     """The content of a picture file in the format of the suffix; equal for equal shapes as PNG and PDF.
 
     The picture is that of `views` for an equilibrium, of `overview` for several, and of `diagram` for a diagram.
@@ -182,15 +187,15 @@ def encode(subject: Equilibrium | Sequence[Equilibrium] | Diagram, suffix: str) 
     if suffix not in SUFFIXES:
         raise InvalidArgument(f"figure: found {suffix or 'no suffix'}, allowed {', '.join(SUFFIXES)}")
     content = io.BytesIO()
-    figure = _figure_of(subject)
+    figure = _figure_of(subject, radius_limit)
     with mpl.rc_context(_STYLE):
         figure.savefig(content, format=suffix[1:], metadata=_METADATA[suffix])
     return content.getvalue()
 
 
-def _figure_of(subject: Equilibrium | Sequence[Equilibrium] | Diagram) -> Figure:
+def _figure_of(subject: Equilibrium | Sequence[Equilibrium] | Diagram, radius_limit: float | None) -> Figure:
     if isinstance(subject, Diagram):
-        return diagram(subject)
+        return diagram(subject, radius_limit=radius_limit)
     return views(subject) if isinstance(subject, Equilibrium) else overview(subject)
 
 
@@ -349,16 +354,21 @@ def _set_one_scale(panels: Sequence[Axes]) -> float:
 # --------------------------------------------------------------------------------------------------- the diagram
 
 
-def _draw_diagram(diagram: Diagram, support: Place | None) -> Figure:
-    panels = list(chart.panels(diagram, support))
+def _draw_diagram(diagram: Diagram, support: Place | None, limit: float | None) -> Figure:
+    panels = list(chart.panels(diagram, support, limit))
     figure = Figure(figsize=(_WIDTH, _PANEL * len(panels) + _DECORATION + _KEY), layout="constrained")
     axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
     snaps = [chart.draw(part, diagram, panel) for part, panel in zip(axes, panels, strict=True)]
-    axes[-1].set_xlabel(diagram.parameter_name, parse_math=False)
+    has_angle = diagram.angle(0.0) is not None
+    name = f"angle of supports[{diagram.support}] [degrees]" if has_angle else diagram.parameter_name
+    axes[-1].set_xlabel(name, parse_math=False)
     figure.align_ylabels(axes)
     figure.suptitle(diagram.scenario.to_dict().get("name") or "belt", fontsize=10.0, parse_math=False)
     figure.legend(
-        handles=list(chart.key(diagram, snaps=any(snaps))), loc="outside lower center", ncols=6, frameon=False
+        handles=list(chart.key(diagram, snaps=any(snaps), limit=limit is not None)),
+        loc="outside lower center",
+        ncols=6,
+        frameon=False,
     )
     return figure
 

@@ -25,7 +25,7 @@ ENDS: dict[End, str] = {
     "budget": "has used up its states before the end of the path",
     "lost": "ends where no step, however short, leads on",
     "taut": "ends where the belt is drawn straight",
-    "edges": "ends where ribs beside a bend come to other edges of the board",
+    "edges": "ends where ribs beside a bend come to other edges of the board, and no equilibrium is found with these",
 }
 """The printed reason of the end of a branch that does not end with the path."""
 NOUGHT = 1e-9
@@ -64,8 +64,17 @@ def report_diagram(diagram: Diagram) -> Group:
         if branch.end in ENDS
     ]
     ends += [Text(f"branch {index} turns back: {back}") for index, back in _turned_back(diagram)]
-    has_events = any(branch.events for branch in diagram.branches)
-    return Group(title, _branches(diagram), *ends, _events(diagram) if has_events else Text("no events"))
+    events = [event for branch in diagram.branches for event in branch.events]
+    unconfirmed = sum(not event.confirmed for event in events)
+    has_events = unconfirmed < len(events)
+    left_out = Text(f"{unconfirmed} events are left out that a finer mesh does not confirm: try more solver.elements")
+    return Group(
+        title,
+        _branches(diagram),
+        *ends,
+        _events(diagram) if has_events else Text("no events"),
+        *([left_out] if unconfirmed else []),
+    )
 
 
 def number(value: float) -> str:
@@ -307,16 +316,20 @@ def _events(diagram: Diagram) -> Table:
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for heading in ("branch", "event"):
         table.add_column(heading)
-    for heading in ("parameter", "negative modes", "energy", "after the snap"):
+    has_angle = diagram.angle(0.0) is not None
+    headings = ("negative", "energy", "snaps to", "moves by")
+    for heading in ("parameter", *(["angle"] if has_angle else []), *headings):
         table.add_column(heading, justify="right")
     for index, branch in enumerate(diagram.branches):
         energy = branch.energy
-        for event in branch.events:
-            table.add_row(str(index), *_event(event, energy[event.state]))
+        for event in filter(lambda event: event.confirmed, branch.events):
+            angle = diagram.angle(event.parameter)
+            angles = [] if angle is None else [f"{angle:.2f}°"]
+            table.add_row(str(index), event.kind, number(event.parameter), *angles, *_event(event, energy[event.state]))
     return table
 
 
 def _event(event: Event, energy: float) -> list[str]:
     before, after = event.negative_modes
-    snapped = "" if event.snapped is None else number(event.snapped.energy)
-    return [event.kind, number(event.parameter), f"{before} → {after}", number(energy), snapped]
+    snap = [] if event.snapped is None else [event.snapped.energy, event.jump]
+    return [f"{before} → {after}", number(energy), *map(number, snap)]

@@ -27,13 +27,18 @@ class Update(NamedTuple):
     status: Status
     """Unless "converged", no equilibrium was found at the new pose, and the tracker stays where it was."""
     snapped: bool
-    """Whether the minimum followed ended or lost its stability on the way, so that the tracker is at another one."""
+    """Whether the minimum followed ended or lost its stability on the way, so that the tracker is at another one, by
+    `solver.snap_size` widths or more."""
     energy: float
     """Total potential, in the unit of the scenario."""
     iterations: int
     """Steps of Newton's method."""
     residual: float
     """Largest residual, lengths in U and energy in mean R_f/U."""
+    jump: float
+    """Largest displacement of a node in a snap; 0 without one."""
+    released: float
+    """Energy released in snaps, in the unit of the scenario."""
 
 
 class Tracker:

@@ -57,7 +57,8 @@ impl Path {
 ///
 /// Errors: `NoBranch`; those that `progress` or a signal handler raises.
 #[pyfunction]
-#[pyo3(signature = (equilibrium, path, step, states, branches, progress=None))]
+#[pyo3(signature = (equilibrium, path, step, states, branches, snaps, progress=None))]
+#[expect(clippy::too_many_arguments, reason = "one for each of Python's")]
 pub(crate) fn follow(
     py: Python<'_>,
     equilibrium: &Equilibrium,
@@ -65,12 +66,14 @@ pub(crate) fn follow(
     step: f64,
     states: usize,
     branches: usize,
+    snaps: bool,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Diagram> {
     let settings = Settings {
         step,
         states,
         branches,
+        snaps,
         ..Settings::default()
     };
     let mut signals = Signals::new();
@@ -94,17 +97,21 @@ pub(crate) fn follow(
 #[pyclass(frozen, module = "fishbone._core")]
 pub(crate) struct Diagram(core::Diagram);
 
-/// Kind, parameter, state, negative modes before and after, and the minimum to which the belt snaps with its parameter.
+/// Parameter of a snap, the minimum to which the belt snaps, largest displacement and energy released.
+type Snapped = (f64, Scenario, Equilibrium, f64, f64);
+
+/// Kind, parameter, state, negative modes before and after, whether it is confirmed, and the snap.
 type Event = (
     &'static str,
     f64,
     usize,
     (usize, usize),
-    Option<(f64, Scenario, Equilibrium)>,
+    bool,
+    Option<Snapped>,
 );
 
 /// Parameter, energy, height, forces and moments of the supports, least bend radius, least radius on the spine, rib margin,
-/// and whether it is stable.
+/// whether it is stable, status and largest residual.
 type Report<'py> = (
     Scalars<'py>,
     Scalars<'py>,
@@ -115,6 +122,8 @@ type Report<'py> = (
     Scalars<'py>,
     Scalars<'py>,
     Vec<Option<bool>>,
+    Vec<&'static str>,
+    Scalars<'py>,
 );
 
 #[pymethods]
@@ -155,7 +164,9 @@ impl Diagram {
                 let equilibrium = snapped.equilibrium.clone();
                 let scenario = Scenario(equilibrium.problem().clone());
                 let parameter = self.0.path.parameter(snapped.place);
-                (parameter, scenario, Equilibrium::of(|| equilibrium))
+                let equilibrium = Equilibrium::of(|| equilibrium);
+                let (jump, released) = (snapped.jump, snapped.released);
+                (parameter, scenario, equilibrium, jump, released)
             });
             let parameter = self.0.path.parameter(event.place);
             (
@@ -163,6 +174,7 @@ impl Diagram {
                 parameter,
                 event.state,
                 (before, after),
+                event.confirmed,
                 snapped,
             )
         };
@@ -202,6 +214,8 @@ impl Diagram {
             column(|s| s.least_spine_radius.unwrap_or(f64::NAN)),
             column(|s| s.rib_margin),
             summaries.iter().map(Summary::stable).collect(),
+            summaries.iter().map(|s| s.status.name()).collect(),
+            column(|s| s.residuals.largest()),
         ))
     }
 

@@ -16,6 +16,9 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 #[pyclass(frozen, module = "fishbone._core")]
 pub(crate) struct Tracker(Mutex<core::Tracker>);
 
+/// Status, whether it snapped, energy, iterations, largest residual, largest displacement and energy released in snaps.
+type Updated = (&'static str, bool, f64, usize, f64, f64, f64);
+
 impl Tracker {
     fn lock(&self) -> MutexGuard<'_, core::Tracker> {
         // A poisoned lock is taken all the same: an update that has panicked is not resumed.
@@ -35,16 +38,11 @@ impl Tracker {
             .map_err(|error| raised(py, &error))
     }
 
-    /// (status, snapped, energy, iterations, largest residual).
+    /// (status, snapped, energy, iterations, largest residual, jump, energy released).
     ///
     /// Errors: `InvalidScenario` for a pose that no scenario may hold; those that a signal handler raises,
     /// `KeyboardInterrupt` first of all.
-    fn update(
-        &self,
-        py: Python<'_>,
-        position: [f64; 3],
-        rotation: [f64; 3],
-    ) -> PyResult<(&'static str, bool, f64, usize, f64)> {
+    fn update(&self, py: Python<'_>, position: [f64; 3], rotation: [f64; 3]) -> PyResult<Updated> {
         let [position, rotation] = [position, rotation].map(Vector3::from);
         let mut signals = Signals::new();
         let update = py.detach(|| {
@@ -60,6 +58,8 @@ impl Tracker {
                 update.energy,
                 update.iterations,
                 update.residuals.largest(),
+                update.jump,
+                update.released,
             )),
         }
     }

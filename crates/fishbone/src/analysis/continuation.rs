@@ -1,18 +1,23 @@
 //! Continuation of equilibria along a path, stable or not: folds, bifurcations, and the minima to which the belt snaps.
 
+mod confirm;
 mod search;
+mod trace;
 
 use crate::analysis::family::{Along, Station};
 use crate::analysis::path::Path;
-use crate::equilibrium::{Equilibrium, Stability, Uncertified, of_solution};
+use crate::equilibrium::guess::is_flat;
+use crate::equilibrium::{Equilibrium, Stability, Status, Uncertified, of_solution};
 use crate::geometry::Wrench;
 use crate::names::named;
 use crate::problem::program::BeltPoint;
 use crate::problem::{Mesh, Problem};
 use crate::surface;
-use stagewise::{Continuation, Events, Pace, Residuals, Stationary};
+use stagewise::{Events, Pace, Residuals, Stationary};
 use std::ops::ControlFlow;
+use std::sync::Arc;
 use thiserror::Error;
+use trace::Stop;
 
 named! {
     /// Why a branch ended.
@@ -37,15 +42,16 @@ named! {
     }
 }
 
-impl From<stagewise::End<()>> for End {
-    fn from(end: stagewise::End<()>) -> Self {
+impl From<stagewise::End<Stop>> for End {
+    fn from(end: stagewise::End<Stop>) -> Self {
         match end {
             stagewise::End::Range => Self::Range,
             stagewise::End::Event => Self::Event,
             stagewise::End::Closed => Self::Closed,
             stagewise::End::Budget => Self::Budget,
             stagewise::End::Lost => Self::Lost,
-            stagewise::End::Stopped(()) => Self::Interrupted,
+            stagewise::End::Stopped(Stop::Edges) => Self::Edges,
+            stagewise::End::Stopped(Stop::Interrupted) => Self::Interrupted,
         }
     }
 }
@@ -57,6 +63,18 @@ pub enum NoBranch {
     /// There is no equilibrium to begin with.
     #[error(transparent)]
     Uncertified(#[from] Uncertified),
+    /// The supports leave the belt no slack.
+    #[error(
+        "the supports hold the belt straight, without slack, so that there is no shape to follow: move the supports a little \
+         closer together, or begin at the other end of the path"
+    )]
+    Taut,
+    /// The belt is flat, and has no single continuation.
+    #[error(
+        "the belt lies flat at the start of the path, where its ribs may turn at no cost of energy, so that it may leave the \
+         plane in many ways: move a support a little, so that the belt is bent, or load it"
+    )]
+    Flat,
     /// The equilibrium has no single continuation.
     #[error(
         "no single branch could be found to follow: the equilibrium may move at no cost of energy, or the solver cannot go on"
@@ -65,6 +83,8 @@ pub enum NoBranch {
 }
 
 named!(impl NoBranch {
+    Taut = "taut",
+    Flat = "flat",
     Singular = "singular",
     ..Uncertified,
 });
@@ -79,6 +99,8 @@ pub struct Settings {
     pub states: usize,
     /// Most branches.
     pub branches: usize,
+    /// Whether the branches to which the belt snaps are followed too.
+    pub snaps: bool,
     /// Search for crossing branches.
     pub crossings: CrossingSettings,
 }
@@ -120,6 +142,7 @@ impl Default for Settings {
             step: 0.05,
             states: 1000,
             branches: 10,
+            snaps: false,
             crossings: CrossingSettings::default(),
         }
     }
@@ -132,7 +155,6 @@ pub struct Diagram {
     pub path: Path,
     /// The branches: first the branch of the equilibrium where the path begins, then those that branch off.
     pub branches: Vec<Branch>,
-    mesh: Mesh,
     settings: Settings,
 }
 
@@ -168,6 +190,7 @@ pub struct State {
     /// Largest residuals of the state's discrete equations.
     pub residuals: Residuals,
     at: Stationary<BeltPoint>,
+    mesh: Arc<Mesh>,
 }
 
 /// Summary of a state for a report, in the units of its scenario.
@@ -189,6 +212,8 @@ pub struct Summary {
     pub rib_margin: f64,
     /// Stability by the second variation, where it is decided.
     pub stability: Option<Stability>,
+    /// Whether the state is an equilibrium to the tolerance, with its ribs apart on the whole board.
+    pub status: Status,
     /// Largest residuals of the state's discrete equations.
     pub residuals: Residuals,
 }
@@ -205,10 +230,12 @@ named! {
         Transcritical = "transcritical",
         /// Other branches cross that could not be followed.
         Bifurcation = "bifurcation",
+        /// The ribs beside a bend come to other edges of the board.
+        Edges = "edges",
     }
 }
 
-/// A place on a branch where the number of negative modes changes.
+/// A place on a branch where the number of negative modes changes, or where other edges hold the ribs.
 #[derive(Debug, Clone)]
 pub struct Event {
     /// Kind of the event.
@@ -219,6 +246,8 @@ pub struct Event {
     pub place: f64,
     /// Negative modes before and after.
     pub negative_modes: [usize; 2],
+    /// Whether the event is found again on the mesh of elements half as long, within 0.01 legs of the path.
+    pub confirmed: bool,
     /// The minimum to which the belt snaps when it is led past the loss of its stability.
     pub snapped: Option<Snapped>,
 }
@@ -228,6 +257,10 @@ pub struct Event {
 pub struct Snapped {
     /// Place on the path, a little past the event.
     pub place: f64,
+    /// Largest displacement of a node.
+    pub jump: f64,
+    /// Energy released.
+    pub released: f64,
     /// The minimum.
     pub equilibrium: Equilibrium,
 }
@@ -246,6 +279,9 @@ pub fn follow(
     proceed: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
 ) -> Result<Diagram, NoBranch> {
     let solved = equilibrium.certified()?;
+    if path.base().has_no_slack() {
+        return Err(NoBranch::Taut);
+    }
     let family = Along {
         path: path.clone(),
         mesh: Mesh::of(path.base(), &solved.program),
@@ -255,17 +291,18 @@ pub fn follow(
         stations: settings.states,
         events: Events::Find,
     };
-    let tolerance = path.base().tolerance();
-    let continuation = Continuation::new(&family, tolerance, [0.0, path.length()], pace);
-    let start = continuation.start(&solved.at, 0.0, true);
-    let start = start.ok_or(NoBranch::Singular)?;
+    let start = family.continuation(pace).start(&solved.at, 0.0, true);
+    let is_flat = |point: &BeltPoint| point.fields.iter().all(is_flat);
+    let start = start.ok_or_else(|| match is_flat(&solved.at.point) {
+        true => NoBranch::Flat,
+        false => NoBranch::Singular,
+    })?;
     let diagram = Diagram {
         path: path.clone(),
         branches: Vec::new(),
-        mesh: family.mesh.clone(),
         settings: *settings,
     };
-    let diagram = search::run(&family, continuation, diagram, start, proceed);
+    let diagram = search::run(&family, pace, diagram, start, proceed);
     match diagram.branches.is_empty() {
         true => Err(NoBranch::Singular),
         false => Ok(diagram),
@@ -280,8 +317,9 @@ impl Summary {
 }
 
 impl State {
-    fn of(station: &Station) -> Self {
+    fn of(station: &Station, mesh: Arc<Mesh>) -> Self {
         Self {
+            mesh,
             place: station.parameter,
             negative_modes: station.negative,
             residuals: station.residuals,
@@ -309,10 +347,10 @@ impl Diagram {
     /// If there is no such state.
     pub fn equilibrium(&self, branch: usize, state: usize) -> Equilibrium {
         let problem = self.problem(branch, state);
-        let program = problem.program_on(&self.mesh);
+        let state = &self.branches[branch].states[state];
+        let program = problem.program_on(&state.mesh);
         let program = program.expect("it was solved there");
-        let at = &self.branches[branch].states[state].at;
-        let solution = stagewise::assess(&program, problem.tolerance(), at);
+        let solution = stagewise::assess(&program, problem.tolerance(), &state.at);
         of_solution(&problem, program, solution)
     }
 
@@ -336,6 +374,7 @@ impl Diagram {
             least_spine_radius: surface::least_spine_radius(spine).map(|least| least.value),
             rib_margin: surface::rib_margin(spine).value,
             stability: equilibrium.stability,
+            status: equilibrium.status,
             residuals: equilibrium.residuals,
         }
     }

@@ -2,14 +2,17 @@
 
 use crate::analysis::path::Path;
 use crate::analysis::sensitivity::add_support_motion;
+use crate::equilibrium::{minimum_next_to_on, prolonged, prolonged_with_multipliers};
 use crate::problem::program::{BeltPoint, BeltProgram, rows_of};
 use crate::problem::{Mesh, Problem};
-use stagewise::{Direction, Family, Program, Stationary, by_differences};
+use stagewise::{Continuation, Direction, Family, Pace, Program, Stationary, by_differences};
+use std::ops::ControlFlow;
 
 /// A station of a branch.
 pub(super) type Station = stagewise::Station<BeltPoint, 8>;
 
 /// The programmes of the problems along a path, all on the same mesh.
+#[derive(Debug, Clone)]
 pub(super) struct Along {
     pub(super) path: Path,
     pub(super) mesh: Mesh,
@@ -21,6 +24,75 @@ impl Along {
         let problem = self.path.at(place)?;
         let program = problem.program_on(&self.mesh)?;
         Some((problem, program))
+    }
+
+    /// The same path on another mesh.
+    pub(super) fn on(&self, mesh: Mesh) -> Self {
+        Self {
+            path: self.path.clone(),
+            mesh,
+        }
+    }
+
+    /// A continuation over the whole path.
+    pub(super) fn continuation(&self, pace: Pace) -> Continuation<'_, Self, 6, 2, 8> {
+        let tolerance = self.path.base().tolerance();
+        Continuation::new(self, tolerance, [0.0, self.path.length()], pace)
+    }
+
+    /// The start of the same branch on the mesh of elements half as long, next to a station of this family, with the path on
+    /// that mesh: by Newton's method, or of a minimum by a search next to it.
+    pub(super) fn on_half_elements(
+        &self,
+        station: &Station,
+        pace: Pace,
+    ) -> Option<(Self, Station)> {
+        let place = station.parameter;
+        let fine = self.on(self.mesh.halved());
+        let shape = self.shape_on(station, &fine)?;
+        let fine = fine.with_active_sets_for(place, &shape)?;
+        if let Some(start) = self.carried_over(station, &fine, pace) {
+            return Some((fine, start));
+        }
+        let is_minimum = station.negative == 0;
+        let problem = self.path.at(place).filter(|_| is_minimum)?;
+        let proceed = &mut || ControlFlow::Continue(());
+        let found = minimum_next_to_on(&problem, &fine.mesh, &shape, proceed);
+        let solved = found.certified().ok()?;
+        let fine = self.on(Mesh::of(&problem, &solved.program));
+        let start = fine
+            .continuation(pace)
+            .start(&solved.at, place, station.is_rising())?;
+        Some((fine, start))
+    }
+
+    /// The shape of a station on another mesh.
+    pub(super) fn shape_on(&self, station: &Station, to: &Self) -> Option<BeltPoint> {
+        let [own, other] = [self, to].map(|family| family.at(station.parameter));
+        Some(prolonged(&own?, &station.at.point, &other?))
+    }
+
+    /// A station's point with its multipliers on another mesh, or with other active edges.
+    fn with_multipliers_on(&self, station: &Station, to: &Self) -> Option<Stationary<BeltPoint>> {
+        let [own, other] = [self, to].map(|family| family.at(station.parameter));
+        Some(prolonged_with_multipliers(&own?, &station.at, &other?))
+    }
+
+    /// The start of a branch on another mesh, or with other active edges, next to a station of this family.
+    pub(super) fn carried_over(&self, station: &Station, to: &Self, pace: Pace) -> Option<Station> {
+        let place = station.parameter;
+        let near = self.with_multipliers_on(station, to)?;
+        to.continuation(pace)
+            .start_near(&near, place, station.is_rising())
+    }
+
+    /// The same path with the active edges for a shape at a place.
+    pub(super) fn with_active_sets_for(&self, place: f64, shape: &BeltPoint) -> Option<Self> {
+        let (problem, mut program) = self.meshed(place)?;
+        if problem.has_active_sets(&program) {
+            problem.choose_active_sets(&mut program, shape);
+        }
+        Some(self.on(Mesh::of(&problem, &program)))
     }
 
     /// Whether the active sets of the programmes are right for a station.

@@ -393,8 +393,7 @@ impl Way {
     }
 
     fn continuation(&self) -> Continuation<'_, Along, 6, 2, 8> {
-        let tolerance = self.family.path.base().tolerance();
-        Continuation::new(&self.family, tolerance, [0.0, self.length()], self.pace)
+        self.family.continuation(self.pace)
     }
 }
 

@@ -1,22 +1,23 @@
 //! Tracking: an equilibrium is followed at the rate of a robot while one of its supports moves.
 
-use crate::equilibrium::{Equilibrium, Status, Uncertified, of_solution, solve_near};
+use crate::equilibrium::{
+    Equilibrium, Solved, Status, Uncertified, minimum_next_to_on, of_solution, solve_near,
+};
 use crate::geometry::{Pose, Wrench, exp};
 use crate::names::named;
 use crate::problem::program::{BeltPoint, BeltProgram};
 use crate::problem::{Mesh, Problem, Units};
 use crate::scenario::error::ScenarioError;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
-use stagewise::{Distance, FollowSettings, Followed, Follower, Residuals};
+use stagewise::{Distance, FollowSettings, Follower, Residuals};
 use std::ops::ControlFlow;
 use thiserror::Error;
 
-/// Distance between equilibria up to which a step downhill is no snap, in U: a rib bound that passes from one element to the
-/// next moves the belt by as much.
-const SMALLEST_JUMP: f64 = 2e-3;
-/// Distance between shapes up to which a change of active edges is no snap, in U: ribs held by another edge move the belt
-/// less.
-const SAME_SHAPE: f64 = 0.01;
+/// Most changes of the active edges, or attempts of one, on the way to a pose, a number.
+const SWITCHES: usize = 40;
+
+/// Distance past the loss of an equilibrium at which the belt is let go downhill, in U and rad.
+const PAST: f64 = 1e-4;
 
 /// The reason why an equilibrium cannot be followed.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -51,8 +52,12 @@ pub struct Update {
     /// Whether the belt is in equilibrium under the new pose; unless converged, the tracker keeps its last pose.
     pub status: Status,
     /// Whether the equilibrium that was followed ceased to exist or to be stable on the way, or could not be followed, and
-    /// the belt has snapped to another equilibrium.
+    /// the belt has snapped to another equilibrium, by `solver.snap_size` or more.
     pub snapped: bool,
+    /// Largest displacement of a node in the largest snap; 0 without a snap.
+    pub jump: f64,
+    /// Energy released in all snaps.
+    pub released: f64,
     /// Total potential of the tracker's present shape.
     pub energy: f64,
     /// Iterations.
@@ -90,7 +95,7 @@ impl Tracker {
             .ok_or(NoTracker::NotClamped(support))?;
         let settings = FollowSettings {
             tolerance: problem.tolerance(),
-            smallest_jump: SMALLEST_JUMP,
+            smallest_jump: problem.snap_size(),
         };
         let follower = Follower::new(solved.program.clone(), settings, &solved.at);
         let follower = follower.ok_or(NoTracker::Marginal)?;
@@ -131,59 +136,178 @@ impl Tracker {
             frame: exp(rotation),
             position: (position - self.problem.origin()) / self.units().length,
         };
-        let turn = turn_between(&from.frame, &goal.frame);
-        let length = (goal.position - from.position).norm() + turn.norm();
-        let mut change = |program: &mut BeltProgram, share: f64| {
-            let between = Pose {
-                position: from.position.lerp(&goal.position, share),
-                frame: match share < 1.0 {
-                    true => from.frame * exp(&(share * turn)),
-                    false => goal.frame,
-                },
-            };
-            program.move_support(support, &between);
+        let mut way = Way {
+            from,
+            turn: turn_between(&from.frame, &goal.frame),
+            goal,
+            start: None,
+            iterations: 0,
+            jump: 0.0,
+            released: 0.0,
         };
-        let followed = self.follower.follow(length, &mut change, proceed);
-        if followed.arrived && self.is_settled() {
-            self.pose = goal;
-            return Ok(Update {
-                status: Status::Converged,
-                snapped: followed.jumped,
-                energy: self.energy(),
-                iterations: followed.iterations,
-                residuals: followed.residuals,
-            });
-        }
-        let problem = self.problem_at(&goal);
-        let problem = problem.expect("the pose has been checked");
-        let mesh = Mesh::of(&problem, self.follower.program());
-        let found = solve_near(&problem, &mesh, self.follower.point(), proceed);
-        Ok(self.take(&found, followed))
-    }
-
-    /// Takes over a found equilibrium where the last equilibrium could not be followed, or its active edges have changed.
-    fn take(&mut self, found: &Equilibrium, followed: Followed) -> Update {
-        let solved = found.solved.as_ref();
-        let is_same = |shape: &BeltPoint| shape.distance(self.follower.point()) < SAME_SHAPE;
-        let goes_on = followed.arrived && solved.is_some_and(|solved| is_same(&solved.at.point));
-        let mut update = Update {
-            status: found.status,
-            snapped: found.status == Status::Converged && (followed.jumped || !goes_on),
-            energy: found.energy,
-            iterations: followed.iterations + found.iterations,
-            residuals: found.residuals,
-        };
-        match Self::new(found, self.support) {
-            Ok(other) => *self = other,
-            Err(_) => {
-                self.return_to_start();
-                if update.status == Status::Converged {
-                    (update.status, update.snapped) = (Status::NotConverged, false);
-                }
-                update.energy = self.energy();
+        let status = self.lead(&mut way, proceed);
+        if status != Status::Converged {
+            (way.jump, way.released) = (0.0, 0.0);
+            if let Some(start) = way.start {
+                self.restart(&start);
             }
         }
-        update
+        let units = self.units();
+        Ok(Update {
+            status,
+            snapped: way.jump > 0.0,
+            jump: way.jump * units.length,
+            released: way.released * units.energy,
+            energy: self.energy(),
+            iterations: way.iterations,
+            residuals: self.follower.residuals(),
+        })
+    }
+
+    /// Leads the support along a way. Where the ribs come to other edges, the belt is followed up to the place, and goes on
+    /// with these.
+    fn lead(&mut self, way: &mut Way, proceed: &mut dyn FnMut() -> ControlFlow<()>) -> Status {
+        let support = self.support;
+        let (mut done, mut ahead) = (0.0, 1.0);
+        for _ in 0..SWITCHES {
+            let mut change = |program: &mut BeltProgram, share: f64| {
+                program.move_support(support, &way.pose(done + share * (ahead - done)));
+            };
+            let length = way.length() * (ahead - done);
+            let followed = self.follower.follow(length, &mut change, proceed);
+            way.iterations += followed.iterations;
+            if !followed.arrived {
+                self.return_to_start();
+                self.remember_start(way);
+                if followed.reached * length > PAST {
+                    ahead = done + followed.reached * (ahead - done);
+                    continue;
+                }
+                let past = (done + PAST / way.length()).min(1.0);
+                let shape = self.point().clone();
+                if !self.snap_to(&shape, &way.pose(past), way, proceed) {
+                    break;
+                }
+                if past >= 1.0 {
+                    return Status::Converged;
+                }
+                (done, ahead) = (past, 1.0);
+                continue;
+            }
+            if self.is_settled() {
+                way.add(followed.jump, followed.released);
+                self.pose = way.pose(ahead);
+                if ahead >= 1.0 {
+                    return Status::Converged;
+                }
+                (done, ahead) = (ahead, 1.0);
+                continue;
+            }
+            let beyond = self.follower.point().clone();
+            self.return_to_start();
+            self.remember_start(way);
+            if followed.jump > 0.0 {
+                // The belt snaps to where other edges hold its ribs.
+                let pose = way.pose(ahead);
+                if !self.snap_to(&beyond, &pose, way, proceed) {
+                    break;
+                }
+                if ahead >= 1.0 {
+                    return Status::Converged;
+                }
+                (done, ahead) = (ahead, 1.0);
+                continue;
+            }
+            if !self.switch_to_edges_of(&beyond, way, proceed) {
+                ahead = 0.5 * (done + ahead);
+            }
+        }
+        self.solve_at(way, proceed)
+    }
+
+    fn remember_start(&mut self, way: &mut Way) {
+        if way.start.is_none() {
+            way.start = Some(self.equilibrium());
+        }
+    }
+
+    /// Takes the active edges of a shape near by; false where these are not right for the present shape.
+    fn switch_to_edges_of(
+        &mut self,
+        shape: &BeltPoint,
+        way: &mut Way,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> bool {
+        let Ok(problem) = self.problem_at(&self.pose) else {
+            return false;
+        };
+        let mut program = self.follower.program().clone();
+        problem.choose_active_sets(&mut program, shape);
+        let mesh = Mesh::of(&problem, &program);
+        let found = minimum_next_to_on(&problem, &mesh, self.follower.point(), proceed);
+        way.iterations += found.iterations;
+        let is_near = |solved: &Solved| {
+            solved.program.edges == program.edges
+                && solved.at.point.distance(self.follower.point()) <= problem.snap_size()
+        };
+        found.certified().is_ok_and(is_near) && self.restart(&found)
+    }
+
+    /// Snaps to the minimum downhill from a shape, with the active edges that are right there; false where there is none.
+    fn snap_to(
+        &mut self,
+        shape: &BeltPoint,
+        pose: &Pose,
+        way: &mut Way,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> bool {
+        let Ok(problem) = self.problem_at(pose) else {
+            return false;
+        };
+        let mesh = Mesh::of(&problem, self.follower.program());
+        let near = minimum_next_to_on(&problem, &mesh, shape, proceed);
+        self.take(&near, way) || self.take(&solve_near(&problem, &mesh, shape, proceed), way)
+    }
+
+    /// Solves at the end of a way on which the belt could not be followed.
+    fn solve_at(&mut self, way: &mut Way, proceed: &mut dyn FnMut() -> ControlFlow<()>) -> Status {
+        let goal = way.goal;
+        let Ok(problem) = self.problem_at(&goal) else {
+            self.return_to_start();
+            return Status::Infeasible;
+        };
+        let mesh = Mesh::of(&problem, self.follower.program());
+        let found = solve_near(&problem, &mesh, self.follower.point(), proceed);
+        match self.take(&found, way) {
+            true => Status::Converged,
+            false if found.status == Status::Infeasible => Status::Infeasible,
+            false => Status::NotConverged,
+        }
+    }
+
+    /// Takes over an equilibrium to which the belt has gone; false where there is none to follow.
+    fn take(&mut self, found: &Equilibrium, way: &mut Way) -> bool {
+        way.iterations += found.iterations;
+        let (energy, before) = (self.energy(), self.point().clone());
+        if !self.restart(found) {
+            self.return_to_start();
+            return false;
+        }
+        let jump = self.point().distance(&before);
+        if jump > self.problem.snap_size() {
+            way.add(jump, (energy - self.energy()) / self.units().energy);
+        }
+        true
+    }
+
+    fn restart(&mut self, found: &Equilibrium) -> bool {
+        match Self::new(found, self.support) {
+            Ok(other) => {
+                *self = other;
+                true
+            }
+            Err(_) => false,
+        }
     }
 
     fn is_settled(&self) -> bool {
@@ -268,6 +392,44 @@ impl Tracker {
             undetermined.set(f64::NAN, &mut wrenches, &mut [], &mut []);
         }
         self.units().wrench(wrenches[support])
+    }
+}
+
+/// A way of the support from pose to pose, and what has happened on it.
+struct Way {
+    from: Pose,
+    goal: Pose,
+    /// Turn of the support, in its own axes.
+    turn: Vector3<f64>,
+    /// The equilibrium at its start, once the belt has been led on in parts.
+    start: Option<Equilibrium>,
+    iterations: usize,
+    /// Largest displacement of a node in a snap, in U.
+    jump: f64,
+    /// Energy released, in mean R_f/U.
+    released: f64,
+}
+
+impl Way {
+    /// Length, displacement in U and turn in rad.
+    fn length(&self) -> f64 {
+        (self.goal.position - self.from.position).norm() + self.turn.norm()
+    }
+
+    /// The pose at a share of the way.
+    fn pose(&self, share: f64) -> Pose {
+        if share >= 1.0 {
+            return self.goal;
+        }
+        Pose {
+            position: self.from.position.lerp(&self.goal.position, share),
+            frame: self.from.frame * exp(&(share * self.turn)),
+        }
+    }
+
+    fn add(&mut self, jump: f64, released: f64) {
+        self.jump = self.jump.max(jump);
+        self.released += released;
     }
 }
 

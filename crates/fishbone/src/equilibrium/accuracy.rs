@@ -1,14 +1,13 @@
 //! The error that the mesh makes, estimated by one Newton step on the mesh of elements half as long.
 
-use super::guess::inside;
-use super::search::{Search, prolong_inequalities, prolonged};
+use super::search::{Search, prolonged, prolonged_with_multipliers};
 use crate::problem::program::{BeltPoint, BeltProgram, Piece, Undetermined};
 use crate::problem::{Mesh, Problem};
 use crate::scenario::SAME_PLACE;
 use crate::strip::spine::Spine;
 use crate::surface::least_spine_radius;
 use nalgebra::Vector3;
-use stagewise::{Distance, Multipliers, Outcome, Solution, Stationary, Values};
+use stagewise::{Distance, Outcome, Solution, Stationary, Values};
 use std::ops::ControlFlow;
 
 /// Estimated errors of a result by its mesh, relative and not negative; NaN where a quantity is not determined.
@@ -96,20 +95,9 @@ impl Estimate {
         /// Error over its change on halving all elements, dimensionless.
         const OVER_CHANGE: f64 = 1.2;
         let fine = problem.program_on(&Mesh::of(problem, program).halved())?;
-        let inequalities = &at.multipliers.inequalities;
-        let point = prolonged(program, &at.point, &fine);
         // On an arc, ribs that nearly meet in an element meet in one of its halves.
-        let ribs_meet = fine.least_slack(&point) <= 0.0;
-        let near = Stationary {
-            point: match ribs_meet {
-                true => inside(&fine, point),
-                false => point,
-            },
-            multipliers: Multipliers {
-                equalities: at.multipliers.equalities.clone(),
-                inequalities: prolong_inequalities(program, inequalities, &fine),
-            },
-        };
+        let ribs_meet = fine.least_slack(&prolonged(program, &at.point, &fine)) <= 0.0;
+        let near = prolonged_with_multipliers(program, at, &fine);
         let own = Quantities::of(
             problem,
             program,

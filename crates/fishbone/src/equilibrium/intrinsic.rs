@@ -173,7 +173,7 @@ fn find(
     from: Start,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> (Found, Option<String>) {
-    let search = Search::of(problem);
+    let mut search = Search::of(problem);
     let MinimumSettings {
         cold_barrier,
         close_barrier,
@@ -181,7 +181,7 @@ fn find(
     } = search.settings;
     let uniform = || problem.program(problem.elements());
     let mut program = match from {
-        Start::Near(mesh, _) | Start::Minimum(mesh, _) | Start::Twin(mesh, _) => {
+        Start::Near(mesh, _) | Start::Minimum(mesh, _) | Start::Close(mesh, _) => {
             problem.program_on(mesh).unwrap_or_else(uniform)
         }
         _ => uniform(),
@@ -191,7 +191,7 @@ fn find(
             Start::Guess => Some(None),
             Start::Shape(shape) => Some(Some((&program, shape, cold_barrier))),
             Start::Minimum(_, shape) => Some(Some((&program, shape, close_barrier))),
-            Start::Near(..) | Start::Close(_) | Start::Twin(..) => None,
+            Start::Near(..) | Start::Close(..) => None,
         };
         if let Some(start) = start {
             return refine(problem, &search, start, proceed).into();
@@ -200,7 +200,9 @@ fn find(
     let solution = match from {
         Start::Near(_, shape) => search.from(&program, shape.clone(), proceed),
         Start::Shape(shape) => search.only_from(&program, shape.clone(), cold_barrier, proceed),
-        Start::Close(shape) | Start::Minimum(_, shape) | Start::Twin(_, shape) => {
+        Start::Close(_, shape) | Start::Minimum(_, shape) => {
+            // Other active sets do not lead away either.
+            search.settings.warm_barrier = close_barrier;
             search.only_from(&program, shape.clone(), close_barrier, proceed)
         }
         Start::Guess => {

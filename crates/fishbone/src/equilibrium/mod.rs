@@ -33,6 +33,7 @@ use std::sync::OnceLock;
 use thiserror::Error;
 
 pub(crate) use intrinsic::of_solution;
+pub(crate) use search::{prolonged, prolonged_with_multipliers};
 
 named! {
     /// How a solve ended.
@@ -277,10 +278,8 @@ enum Start<'a> {
     Minimum(&'a Mesh, &'a BeltPoint),
     /// At a shape that need not be near to a minimum, and nowhere else.
     Shape(&'a BeltPoint),
-    /// At a shape very near to a minimum, and nowhere else.
-    Close(&'a BeltPoint),
-    /// On a mesh that is fine enough, at a shape very near to a minimum, and nowhere else.
-    Twin(&'a Mesh, &'a BeltPoint),
+    /// On a mesh, at a shape very near to a minimum, and nowhere else.
+    Close(&'a Mesh, &'a BeltPoint),
 }
 
 /// The equilibrium of a problem: found from the guess, or followed from a quarter turn where supports are turned by more than
@@ -379,5 +378,16 @@ pub(crate) fn minimum_next_to(
     shape: &BeltPoint,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Equilibrium {
-    intrinsic::solve(problem, Start::Close(shape), proceed)
+    let mesh = Mesh::uniform(problem, problem.elements());
+    minimum_next_to_on(problem, &mesh, shape, proceed)
+}
+
+/// The minimum next to a shape on a mesh, whatever its active sets.
+pub(crate) fn minimum_next_to_on(
+    problem: &Problem,
+    mesh: &Mesh,
+    shape: &BeltPoint,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Equilibrium {
+    intrinsic::solve(problem, Start::Close(mesh, shape), proceed)
 }

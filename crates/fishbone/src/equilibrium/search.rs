@@ -4,7 +4,7 @@ use crate::equilibrium::guess::{buckle, disturb, guess, inside, is_flat, ring};
 use crate::problem::program::{BeltPoint, BeltProgram, Piece};
 use crate::scenario::SAME_PLACE;
 use nalgebra::{Vector2, Vector3};
-use stagewise::{Outcome, Program, Settings, Solution};
+use stagewise::{Multipliers, Outcome, Program, Settings, Solution, Stationary};
 use std::f64::consts::PI;
 use std::ops::ControlFlow;
 
@@ -302,7 +302,7 @@ pub(super) fn prolong(from: &BeltProgram, point: &BeltPoint, to: &BeltProgram) -
 }
 
 /// A shape prolonged to another mesh.
-pub(super) fn prolonged(from: &BeltProgram, point: &BeltPoint, to: &BeltProgram) -> BeltPoint {
+pub(crate) fn prolonged(from: &BeltProgram, point: &BeltPoint, to: &BeltProgram) -> BeltPoint {
     let (nodes, known) = (to.nodes(), from.nodes());
     let after_joint = |k: usize| k > 0 && matches!(to.pieces[k - 1], Piece::Joint { .. });
     let places = nodes.iter().enumerate();
@@ -315,6 +315,26 @@ pub(super) fn prolonged(from: &BeltProgram, point: &BeltPoint, to: &BeltProgram)
     };
     to.settle(&mut prolonged);
     prolonged
+}
+
+/// A point with its multipliers prolonged to another mesh, or to another active set; its ribs a little off the bound where
+/// they would meet.
+pub(crate) fn prolonged_with_multipliers(
+    from: &BeltProgram,
+    at: &Stationary<BeltPoint>,
+    to: &BeltProgram,
+) -> Stationary<BeltPoint> {
+    let point = prolonged(from, &at.point, to);
+    Stationary {
+        point: match to.least_slack(&point) <= 0.0 {
+            true => inside(to, point),
+            false => point,
+        },
+        multipliers: Multipliers {
+            equalities: at.multipliers.equalities.clone(),
+            inequalities: prolong_inequalities(from, &at.multipliers.inequalities, to),
+        },
+    }
 }
 
 /// The inequalities' multipliers prolonged to another mesh: the multipliers of a stage are shared out by length.

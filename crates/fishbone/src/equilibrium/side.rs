@@ -327,7 +327,7 @@ impl Image {
     ) -> Equilibrium {
         let problem = &original.problem;
         let mesh = Mesh::of(problem, &solved.program);
-        let twin = solve(problem, Start::Twin(&mesh, &self.shape), proceed);
+        let twin = solve(problem, Start::Close(&mesh, &self.shape), proceed);
         let refined = twin
             .refined_for(problem, proceed)
             .filter(|_| self.is_backwards);

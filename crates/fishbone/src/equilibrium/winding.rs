@@ -133,6 +133,6 @@ impl Way {
         };
         next.iterations += found.iterations + followed.iterations;
         *found = next;
-        (found.status == Status::Converged).then_some(followed.jumped)
+        (found.status == Status::Converged).then_some(followed.jump > 0.0)
     }
 }

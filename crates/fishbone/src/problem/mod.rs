@@ -264,6 +264,11 @@ impl Problem {
         self.scenario.solver.accuracy
     }
 
+    /// The largest displacement from which a jump to another equilibrium is a snap, in U.
+    pub(crate) fn snap_size(&self) -> f64 {
+        self.scenario.solver.snap_size * self.belt.width / self.units.length
+    }
+
     /// Whether the scenario names the number of elements.
     pub(crate) fn has_fixed_mesh(&self) -> bool {
         self.scenario.solver.elements.is_some()

@@ -326,6 +326,9 @@ table! {
         /// Max-norm of stationarity, constraints and complementarity, with lengths in U and energy in mean R_f/U.
         #[schemars(range(min = 1e-13, max = 1e-2))]
         pub tolerance: f64,
+        /// Largest displacement on the belt, in its width V, from which a jump to another equilibrium is reported as a snap.
+        #[schemars(range(min = 0.0, max = 10.0))]
+        pub snap_size: f64,
         /// Direction of the bulge, world axes: of two mirror images, the one that bulges along it is taken. Shapes: (3,).
         pub bulge: [f64; 3],
         /// Settings of the method `ritz`.
@@ -340,6 +343,7 @@ impl Default for SolverSpec {
             accuracy: 1e-3,
             elements: None,
             tolerance: 1e-8,
+            snap_size: 1e-2,
             bulge: [1.0, 0.0, 0.0],
             ritz: RitzSpec::default(),
         }

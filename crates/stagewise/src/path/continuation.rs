@@ -11,7 +11,7 @@ use super::family::{Alone, Family};
 use crate::interior_point::{Settings, Solution, assess, minimise};
 use crate::linear::modes::dot;
 use crate::linear::{Mode, Response, lowest_modes, moved};
-use crate::program::{Distance, Program, Stationary};
+use crate::program::{Distance, Program, Stationary, Values};
 use std::ops::ControlFlow;
 
 /// Follows the stationary points of a family.
@@ -31,6 +31,8 @@ const SHORTEST: f64 = 1e-7;
 
 /// A step of a continuation.
 pub(super) struct Step<P, const N: usize> {
+    /// Length along the tangent.
+    pub(super) length: f64,
     pub(super) station: Station<P, N>,
     pub(super) event: Option<Event<P, N>>,
     pub(super) arrived: bool,
@@ -72,12 +74,35 @@ impl<'a, F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
         Some(station)
     }
 
-    /// Follows the curve from a station to the end of the range or of the budget. `proceed` is called
-    /// once a step, and ends the curve for a reason of the caller's by `Break`.
+    /// As [`Self::start`], at a point close to a solution: that of a programme with other inequalities, or on other stages.
+    /// A multiplier that is too small for its slack is raised.
+    pub fn start_near(
+        &self,
+        near: &Stationary<F::Point>,
+        parameter: f64,
+        rising: bool,
+    ) -> Option<Station<F::Point, N>> {
+        let program = self.family.at(parameter)?;
+        let mut at = near.clone();
+        let mut values = Values::default();
+        if !program.evaluate(&mut at.point, &mut values) {
+            return None;
+        }
+        let barrier = self.barrier(&program);
+        let layout = program.layout();
+        let rows = values.slacks.iter().zip(layout.row_weights());
+        for (multiplier, (slack, weight)) in at.multipliers.inequalities.iter_mut().zip(rows) {
+            *multiplier = multiplier.max(barrier * weight / slack);
+        }
+        self.start(&at, parameter, rising)
+    }
+
+    /// Follows the curve from a station to the end of the range or of the budget. `proceed` is called with every station
+    /// before the curve goes on from there, and ends the curve for a reason of the caller's by `Break`.
     pub fn trace<R>(
         &self,
         start: Station<F::Point, N>,
-        proceed: &mut dyn FnMut(f64) -> ControlFlow<R>,
+        proceed: &mut dyn FnMut(&Station<F::Point, N>) -> ControlFlow<R>,
     ) -> Curve<F::Point, R, N> {
         let mut curve = Curve {
             stations: vec![start],
@@ -87,15 +112,24 @@ impl<'a, F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
         let mut length = 0.2 * self.pace.longest;
         while curve.stations.len() < self.pace.stations {
             let last = curve.stations.last().expect("it began with one");
-            if let ControlFlow::Break(reason) = proceed(last.parameter) {
+            if let ControlFlow::Break(reason) = proceed(last) {
                 curve.end = End::Stopped(reason);
                 break;
             }
             let step = self.advance(last, &mut length);
-            let Some(step) = step.or_else(|| self.round_corner(last, &mut length)) else {
+            let Some(mut step) = step.or_else(|| self.round_corner(last, &mut length)) else {
                 curve.end = End::Lost;
                 break;
             };
+            let first = &curve.stations[0];
+            let closing = match curve.stations.len() {
+                1 => None,
+                _ => self.closing(first, last, &step),
+            };
+            if let Some(length) = closing {
+                step.station = first.clone();
+                step.event = self.event_on(last, first, length);
+            }
             if let Some(event) = step.event {
                 let is_last = self.pace.events == Events::EndAtFirst || event.turn == Turn::Apex;
                 curve.stations.push(event.station.clone());
@@ -110,7 +144,7 @@ impl<'a, F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
                 curve.end = End::Range;
                 break;
             }
-            if self.is_closed(&curve.stations) {
+            if closing.is_some() {
                 curve.end = End::Closed;
                 break;
             }
@@ -202,10 +236,7 @@ impl<'a, F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
                 }
                 continue;
             };
-            let event = match self.pace.events {
-                Events::Ignore => None,
-                Events::Find | Events::EndAtFirst => self.event_between(last, &next, *length),
-            };
+            let event = self.event_on(last, &next, *length);
             let [low, high] = self.range;
             if next.parameter < low || next.parameter > high {
                 let inside = event.filter(|event| (low..=high).contains(&event.station.parameter));
@@ -213,13 +244,16 @@ impl<'a, F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
                 let end = next.parameter.clamp(low, high);
                 let station = self.land(from, &next, end)?;
                 return Some(Step {
+                    length: *length,
                     station,
                     event: inside,
                     arrived: true,
                 });
             }
-            *length = (LONGER * *length).min(self.pace.longest);
+            let taken = *length;
+            *length = (LONGER * taken).min(self.pace.longest);
             return Some(Step {
+                length: taken,
                 station: next,
                 event,
                 arrived: false,
@@ -255,21 +289,50 @@ impl<'a, F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
         0.5 * self.softness * self.tolerance / heaviest
     }
 
-    /// Whether the last station coincides with the first, so that the curve is closed.
-    fn is_closed(&self, stations: &[Station<F::Point, N>]) -> bool {
-        /// Count of stations of the shortest closed curve; a number.
-        const SHORTEST_LOOP: usize = 10;
-        /// Distance in the parameter, in [`Scales::distance`](crate::Scales::distance), and relative distance in the
-        /// objective, dimensionless, of stations that coincide.
-        const SAME: f64 = 1e-6;
-        let [first, .., last] = stations else {
-            return false;
+    /// The length at which a step from a station passes through the first station of its curve, so that the curve is closed:
+    /// the nearest station on the step, found by golden sections, coincides with the first one. `None` of other steps.
+    fn closing(
+        &self,
+        first: &Station<F::Point, N>,
+        from: &Station<F::Point, N>,
+        step: &Step<F::Point, N>,
+    ) -> Option<f64> {
+        /// Largest distance from the first station at the ends of a step that may pass it, in steps; dimensionless.
+        const NEAR: f64 = 1.5;
+        /// Cosine of the largest angle of the tangents there; dimensionless.
+        const SAME_WAY: f64 = 0.8;
+        /// Distance up to which stations coincide, in steps; dimensionless.
+        const SAME: f64 = 1e-3;
+        /// Count of golden sections; a number.
+        const SECTIONS: usize = 20;
+        let way = from.distance(&step.station);
+        let may_pass = [from, &step.station]
+            .into_iter()
+            .all(|end| end.distance(first) <= NEAR * way && end.cosine(first) > SAME_WAY);
+        if !may_pass {
+            return None;
+        }
+        let golden = 0.5 * (5f64.sqrt() - 1.0);
+        let off = |length: f64| {
+            let station = self.step(from, &from.tangent, length);
+            station.map_or(f64::INFINITY, |station| station.distance(first))
         };
-        let objective = (first.objective - last.objective).abs();
-        let parameter = (first.parameter - last.parameter).abs();
-        stations.len() > SHORTEST_LOOP
-            && parameter <= SAME * self.unit
-            && objective <= SAME * first.objective.abs()
+        let [mut low, mut high] = [0.0, step.length];
+        let mut inner = [1.0 - golden, golden].map(|share| share * step.length);
+        let mut values = inner.map(off);
+        for _ in 0..SECTIONS {
+            if values[0] < values[1] {
+                high = inner[1];
+                inner = [high - golden * (high - low), inner[0]];
+                values = [off(inner[0]), values[0]];
+            } else {
+                low = inner[0];
+                inner = [inner[1], low + golden * (high - low)];
+                values = [values[1], off(inner[1])];
+            }
+        }
+        let nearest = usize::from(values[1] < values[0]);
+        (values[nearest] <= SAME * way).then_some(inner[nearest])
     }
 }
 

@@ -33,6 +33,7 @@ impl<F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
         };
         let [low, high] = self.range;
         Some(Step {
+            length: last.distance(&beyond),
             arrived: beyond.parameter <= low || beyond.parameter >= high,
             station: beyond,
             event,

@@ -4,7 +4,7 @@ use crate::interior_point::Residuals;
 use crate::linear::chain::NodeVector;
 use crate::linear::modes::dot;
 use crate::linear::{Direction, Mode};
-use crate::program::Stationary;
+use crate::program::{Distance, Stationary};
 
 /// A stationary point on a curve.
 #[derive(Debug, Clone)]
@@ -108,7 +108,20 @@ pub enum Events {
     EndAtFirst,
 }
 
+impl<P: Distance, const N: usize> Station<P, N> {
+    /// Distance of two stations, in point and parameter alike.
+    pub(super) fn distance(&self, other: &Self) -> f64 {
+        let moved = self.at.point.distance(&other.at.point);
+        moved.hypot(self.parameter - other.parameter)
+    }
+}
+
 impl<P, const N: usize> Station<P, N> {
+    /// Whether the parameter grows along the curve.
+    pub fn is_rising(&self) -> bool {
+        self.tangent.parameter > 0.0
+    }
+
     /// Cosine of the angle between the tangents of two stations.
     pub(super) fn cosine(&self, other: &Self) -> f64 {
         self.tangent.dot(&other.tangent)

@@ -1,17 +1,30 @@
 //! Events between two stations, where the second variation becomes singular.
 
 use super::continuation::Continuation;
-use super::curve::{Event, Station, Turn};
+use super::curve::{Event, Events, Station, Turn};
 use super::family::Family;
 
 impl<F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
     Continuation<'_, F, X, U, N>
 {
+    /// The event on a step of a length from a station to the next, unless events are ignored.
+    pub(super) fn event_on(
+        &self,
+        from: &Station<F::Point, N>,
+        to: &Station<F::Point, N>,
+        length: f64,
+    ) -> Option<Event<F::Point, N>> {
+        match self.pace.events {
+            Events::Ignore => None,
+            Events::Find | Events::EndAtFirst => self.event_between(from, to, length),
+        }
+    }
+
     /// The event between two stations.
     ///
     /// A bracket of the event is narrowed by the secant method (Illinois). Next to the event the system is nearly singular,
     /// and steps may fail; the function is smooth, so that the last secant extrapolates.
-    pub(super) fn event_between(
+    fn event_between(
         &self,
         from: &Station<F::Point, N>,
         to: &Station<F::Point, N>,

@@ -13,10 +13,14 @@ pub struct Followed {
     pub iterations: usize,
     /// Residuals at the end.
     pub residuals: Residuals,
-    /// Whether the minimum was lost on the way, and the point at the end is another minimum.
-    pub jumped: bool,
+    /// Distance of the largest jump to another minimum where the minimum was lost on the way; 0 without a jump.
+    pub jump: f64,
+    /// Fall of the objective in all jumps.
+    pub released: f64,
     /// Whether the end of the way was reached; if not, the point is the last minimum on the way.
     pub arrived: bool,
+    /// Share of the way up to which the minimum was followed.
+    pub reached: f64,
 }
 
 /// A minimum with the work arrays to follow it: only programmes with constraints between pairs allocate on the way.
@@ -36,8 +40,7 @@ pub struct Follower<P: Program<X, U, N>, const X: usize, const U: usize, const N
 pub struct FollowSettings {
     /// Largest residual of a minimum.
     pub tolerance: f64,
-    /// Distance between minima up to which a descent is no jump, in the unit of [`Distance`]: an active inequality that moves
-    /// from a stage to the next causes distances up to this size.
+    /// Distance between minima up to which a descent is no jump, in the unit of [`Distance`].
     pub smallest_jump: f64,
 }
 
@@ -47,8 +50,12 @@ struct Way {
     stride: f64,
     iterations: usize,
     leaps: usize,
-    jumped: bool,
+    jump: f64,
+    released: f64,
 }
+
+/// Ratio of the distance between minima to the length of the way up to which the way is smooth; dimensionless.
+const SMOOTH: f64 = 100.0;
 
 impl<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> Follower<P, X, U, N>
 where
@@ -91,6 +98,11 @@ where
         &self.iterate.values
     }
 
+    /// Residuals at the present minimum.
+    pub fn residuals(&mut self) -> Residuals {
+        self.iterate.residuals()
+    }
+
     /// Multipliers at the present minimum.
     pub fn multipliers(&self) -> &Multipliers {
         &self.iterate.multipliers
@@ -107,8 +119,9 @@ where
         change: &mut dyn FnMut(&mut P, f64),
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Followed {
-        /// Length of the shortest stride, as a share of the way; dimensionless.
-        const SHORTEST_STRIDE: f64 = 1e-4;
+        /// Bounds of the length of the shortest stride, as a share of the way; dimensionless. On a long way it is so short that
+        /// smooth motion on it hides no jump.
+        const SHORTEST_STRIDES: [f64; 2] = [1e-8, 1e-4];
         /// Largest count of leaps to another minimum on one way; a number.
         const MOST_LEAPS: usize = 20;
         let mut way = Way {
@@ -116,8 +129,11 @@ where
             stride: 1.0,
             iterations: 0,
             leaps: 0,
-            jumped: false,
+            jump: 0.0,
+            released: 0.0,
         };
+        let hidden = self.settings.smallest_jump / (SMOOTH * length);
+        let shortest = hidden.clamp(SHORTEST_STRIDES[0], SHORTEST_STRIDES[1]);
         self.first.copy_from(&self.last);
         while way.done < 1.0 && way.leaps < MOST_LEAPS && proceed().is_continue() {
             let next = (way.done + way.stride).min(1.0);
@@ -126,13 +142,13 @@ where
             way.iterations += iterations;
             let arrived = kept || {
                 self.go_back();
-                way.stride <= SHORTEST_STRIDE && self.leap(length, next, &mut way, proceed)
+                way.stride <= shortest && self.leap(length, next, &mut way, proceed)
             };
             if arrived {
                 self.keep();
                 way.done = next;
                 way.stride *= 2.0;
-            } else if way.stride <= SHORTEST_STRIDE {
+            } else if way.stride <= shortest {
                 break;
             } else {
                 way.stride *= 0.25;
@@ -142,8 +158,10 @@ where
         Followed {
             iterations: way.iterations,
             residuals: self.iterate.residuals(),
-            jumped: way.jumped,
+            jump: way.jump,
+            released: way.released,
             arrived: way.done >= 1.0,
+            reached: way.done,
         }
     }
 
@@ -159,14 +177,14 @@ where
         const FIRST_BARRIER: f64 = 1e-5;
         /// Largest count of interior-point iterations of a leap; a number.
         const ITERATIONS: usize = 300;
-        /// Ratio of the distance between minima to the length of the way up to which the way is smooth; dimensionless.
-        const SMOOTH: f64 = 100.0;
         way.leaps += 1;
         let settings = Settings {
             tolerance: self.settings.tolerance,
             iterations: ITERATIONS,
             barrier: FIRST_BARRIER,
         };
+        // The iterate is at the lost minimum; the little that the programme has changed since is left out.
+        let before = self.iterate.values.objective;
         let found = minimise(
             &self.iterate.program,
             &settings,
@@ -178,8 +196,11 @@ where
             return false;
         }
         let moved = length * (next - way.done);
-        way.jumped |= found.at.point.distance(&self.last.point)
-            > SMOOTH * moved + self.settings.smallest_jump;
+        let jump = found.at.point.distance(&self.last.point);
+        if jump > SMOOTH * moved + self.settings.smallest_jump {
+            way.jump = way.jump.max(jump);
+            way.released += before - found.values.objective;
+        }
         self.start_from(&found.at)
     }
 

@@ -65,7 +65,7 @@ where
     let range = if forth { [0.0, far] } else { [-far, 0.0] };
     let continuation = Continuation::new(&family, tolerance, range, pace);
     let start = continuation.start(from, 0.0, forth)?;
-    let curve = continuation.trace(start, proceed);
+    let curve = continuation.trace(start, &mut |station| proceed(station.parameter));
     let last = curve.stations.into_iter().next_back()?;
     (curve.end == End::Range && last.parameter == 0.0).then_some(last.at)
 }

@@ -1,126 +1,158 @@
 //! The search for a diagram: a branch is traced, then the branches that cross it at its events.
 
+use super::confirm::is_confirmed;
+use super::trace::{Crossing, Stretch, trace};
 use super::{Branch, CrossingSettings, Diagram, End, Event, Kind, Origin, Snapped, State};
 use crate::analysis::family::{Along, Station};
 use crate::analysis::symmetry::{SAME, are_images};
-use crate::equilibrium::{Status, of_solution};
-use crate::problem::program::BeltPoint;
-use stagewise::{Continuation, Distance, Family, Turn};
+use crate::equilibrium::{Status, minimum_next_to_on, of_solution, solve_near};
+use crate::problem::Mesh;
+use stagewise::{Distance, Family, Pace, Turn};
 use std::ops::ControlFlow;
-
-/// A place where the number of negative modes changes.
-type Crossing = stagewise::Event<BeltPoint, 8>;
-/// A curve of equilibria that may have been interrupted.
-type Curve = stagewise::Curve<BeltPoint, (), 8>;
+use std::sync::Arc;
 
 /// Traces a branch from a station, and the branches off it, into an empty diagram.
 pub(super) fn run(
     family: &Along,
-    continuation: Continuation<'_, Along, 6, 2, 8>,
+    pace: Pace,
     diagram: Diagram,
     start: Station,
     proceed: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
 ) -> Diagram {
     let mut search = Search {
-        family,
-        continuation,
+        pace,
         proceed,
         diagram,
     };
-    search.trace(None, start);
+    search.trace(None, family, start);
     search.diagram
 }
 
 /// A diagram in the making.
-struct Search<'a, 'b> {
-    family: &'a Along,
-    continuation: Continuation<'a, Along, 6, 2, 8>,
-    proceed: &'b mut dyn FnMut(usize, f64) -> ControlFlow<()>,
+struct Search<'a> {
+    pace: Pace,
+    proceed: &'a mut dyn FnMut(usize, f64) -> ControlFlow<()>,
     diagram: Diagram,
 }
 
-impl Search<'_, '_> {
-    /// Traces a branch, then the branches off it.
-    fn trace(&mut self, origin: Option<Origin>, start: Station) {
+impl Search<'_> {
+    /// Traces a branch, then the branches off it; gives the reason of its end.
+    fn trace(&mut self, origin: Option<Origin>, family: &Along, start: Station) -> Option<End> {
         let index = self.diagram.branches.len();
-        let curve = self
-            .continuation
-            .trace(start, &mut |place| (self.proceed)(index, place));
-        let (
-            Curve {
-                stations, events, ..
-            },
-            end,
-        ) = self.settled(curve);
-        if stations.is_empty() {
-            return;
-        }
+        let proceed = &mut |station: &Station| (self.proceed)(index, station.parameter);
+        let (mut stretches, end) = trace(family, start, self.pace, proceed);
+        let last = stretches.last_mut()?;
+        let end = without_mirror_image(last, End::from(end));
         self.diagram.branches.push(Branch {
             origin,
-            states: stations.iter().map(State::of).collect(),
+            states: stretches.iter().flat_map(states).collect(),
             events: Vec::new(),
             end,
         });
-        for (state, event) in events {
-            if end == End::Interrupted {
-                return;
+        if end == End::Interrupted {
+            return Some(end);
+        }
+        let mut first = 0;
+        for (place, stretch) in stretches.iter().enumerate() {
+            if place > 0 {
+                self.add_switch(index, first, stretch);
             }
-            let crossing = self.crossing(&event, &stations[..state]);
-            let onwards = (event.parameter - stations[state - 1].parameter).signum();
-            let is_loss = event.negative[0] == 0 && event.negative[1] > 0;
-            let snapped = is_loss
-                .then(|| self.snapped(&event, &crossing, onwards))
-                .flatten();
-            let events = &mut self.diagram.branches[index].events;
-            let origin = Origin {
-                branch: index,
-                event: events.len(),
-            };
-            events.push(Event {
-                kind: kind(&event, &crossing),
-                state,
-                place: event.parameter,
-                negative_modes: event.negative,
-                snapped,
-            });
-            for side in self.different(crossing) {
-                let is_known = self.is_known(&side);
-                if is_known || self.diagram.branches.len() >= self.diagram.settings.branches {
-                    continue;
-                }
-                for rising in self.ways(&event, &side) {
-                    let start = self.continuation.start(&side.at, side.parameter, rising);
-                    if let Some(start) = start {
-                        self.trace(Some(origin), start);
-                    }
+            for (state, event) in &stretch.events {
+                self.add_event(index, first, *state, event, stretch);
+            }
+            first += stretch.stations.len();
+        }
+        Some(end)
+    }
+
+    /// Adds the event of other active edges at the first state of a stretch.
+    fn add_switch(&mut self, branch: usize, state: usize, stretch: &Stretch) {
+        let start = &stretch.stations[0];
+        let branch = &mut self.diagram.branches[branch];
+        branch.events.push(Event {
+            kind: Kind::Edges,
+            state,
+            place: start.parameter,
+            negative_modes: [branch.states[state - 1].negative_modes, start.negative],
+            confirmed: true,
+            snapped: None,
+        });
+    }
+
+    /// Adds an event of a stretch whose first state on its branch is given, and traces the branches off it.
+    fn add_event(
+        &mut self,
+        branch: usize,
+        first: usize,
+        state: usize,
+        event: &Crossing,
+        stretch: &Stretch,
+    ) {
+        let crossing = self.crossing(event, &stretch.stations[..state], &stretch.family);
+        let before = state.checked_sub(1).map(|before| &stretch.stations[before]);
+        let is_loss = event.negative[0] == 0 && event.negative[1] > 0;
+        let snapped = is_loss
+            .then(|| self.snapped(event, &crossing, before, &stretch.family))
+            .flatten();
+        let pace = self.pace;
+        let ask = &mut |station: &Station| (self.proceed)(branch, station.parameter);
+        let confirmed = is_confirmed(stretch, state, event, pace, ask);
+        let events = &mut self.diagram.branches[branch].events;
+        let origin = Origin {
+            branch,
+            event: events.len(),
+        };
+        events.push(Event {
+            kind: kind(event, &crossing),
+            state: first + state,
+            place: event.parameter,
+            negative_modes: event.negative,
+            confirmed,
+            snapped,
+        });
+        let landed = self.landed(branch, origin.event, stretch);
+        if let Some((family, start)) = landed.filter(|(_, start)| self.may_follow(start)) {
+            self.trace(Some(origin), &family, start);
+        }
+        for side in self.different(crossing) {
+            if !self.may_follow(&side) {
+                continue;
+            }
+            for rising in self.ways(event, &side) {
+                let continuation = stretch.family.continuation(self.pace);
+                let start = continuation.start(&side.at, side.parameter, rising);
+                let end = start.and_then(|start| self.trace(Some(origin), &stretch.family, start));
+                if end == Some(End::Closed) {
+                    // The other way round is the same curve.
+                    break;
                 }
             }
         }
     }
 
-    /// A curve up to the first station for which the active edges are wrong, with the reason of its end.
-    fn settled(&self, mut curve: Curve) -> (Curve, End) {
-        let mut end = End::from(curve.end);
-        let is_unsettled = |station: &Station| !self.family.holds(station);
-        if let Some(first) = curve.stations.iter().position(is_unsettled) {
-            curve.stations.truncate(first);
-            curve.events.retain(|(state, _)| *state < first);
-            end = End::Edges;
-        }
-        let reached = curve.stations.last().map(|station| station.parameter);
-        let is_open = matches!(end, End::Event | End::Lost);
-        if is_open && reached.is_some_and(|place| self.family.is_near_limit(place)) {
-            // Through the flat belt the branch would go over into its mirror image.
-            curve.events.retain(|(_, event)| event.turn != Turn::Apex);
-            end = End::Taut;
-        }
-        (curve, end)
+    /// The start of the branch to which the belt snaps at an event, in the direction in which it was led.
+    fn landed(&self, branch: usize, event: usize, stretch: &Stretch) -> Option<(Along, Station)> {
+        let event = &self.diagram.branches[branch].events[event];
+        let is_wanted = self.diagram.settings.snaps && event.confirmed;
+        let snapped = event.snapped.as_ref().filter(|_| is_wanted)?;
+        let solved = snapped.equilibrium.certified().ok()?;
+        let mesh = Mesh::of(snapped.equilibrium.problem(), &solved.program);
+        let family = stretch.family.on(mesh);
+        let continuation = family.continuation(self.pace);
+        let rising = snapped.place > event.place;
+        let start = continuation.start(&solved.at, snapped.place, rising)?;
+        Some((family, start))
+    }
+
+    /// Whether a branch from a station is new and not one too many.
+    fn may_follow(&self, station: &Station) -> bool {
+        !self.is_known(station) && self.diagram.branches.len() < self.diagram.settings.branches
     }
 
     /// The stations of other branches that cross at an event, a little before it or beyond.
     ///
     /// From beside the event a load along the vanishing mode leads over to these branches.
-    fn crossing(&mut self, event: &Crossing, before: &[Station]) -> Vec<Station> {
+    fn crossing(&mut self, event: &Crossing, before: &[Station], family: &Along) -> Vec<Station> {
         let settings = self.diagram.settings.crossings;
         match event.turn {
             Turn::Fold => return Vec::new(),
@@ -128,7 +160,7 @@ impl Search<'_, '_> {
             Turn::Apex => {
                 let mut found = settings.before.into_iter().map(|far| {
                     let before = before_by(far, event, before);
-                    let others = self.beyond_modal_load(before, &event.mode);
+                    let others = self.beyond_modal_load(before, &event.mode, family);
                     let is_other = |other: &Station| other.negative != before.negative;
                     let others = others.into_iter().flatten().flatten().filter(is_other);
                     others.collect::<Vec<_>>()
@@ -140,10 +172,10 @@ impl Search<'_, '_> {
         for by in settings.beside {
             let mut found = Vec::new();
             for by in [by, -by] {
-                let Some(beside) = self.continuation.beside(event, by) else {
+                let Some(beside) = family.continuation(self.pace).beside(event, by) else {
                     continue;
                 };
-                let others = self.beyond_modal_load(&beside, &event.mode);
+                let others = self.beyond_modal_load(&beside, &event.mode, family);
                 let near =
                     |other: &Station| other.at.point.distance(&beside.at.point) < settings.near;
                 found.extend(others.into_iter().flatten().flatten().filter(near));
@@ -160,13 +192,14 @@ impl Search<'_, '_> {
         &mut self,
         from: &Station,
         mode: &stagewise::Mode<8>,
+        family: &Along,
     ) -> Option<[Option<Station>; 2]> {
         let Self {
-            family,
-            continuation,
+            pace,
             proceed,
             diagram,
         } = self;
+        let continuation = family.continuation(*pace);
         let branch = diagram.branches.len();
         let program = family.at(from.parameter)?;
         let tolerance = family.path.base().tolerance();
@@ -220,21 +253,75 @@ impl Search<'_, '_> {
     }
 
     /// The minimum to which a belt led on past an event snaps.
-    fn snapped(&mut self, event: &Crossing, crossing: &[Station], onwards: f64) -> Option<Snapped> {
-        let place = event.parameter + self.diagram.settings.crossings.past * onwards;
+    fn snapped(
+        &mut self,
+        event: &Crossing,
+        crossing: &[Station],
+        before: Option<&Station>,
+        family: &Along,
+    ) -> Option<Snapped> {
+        let onwards = before.map_or(1.0, |before| event.parameter - before.parameter);
+        let past = self.diagram.settings.crossings.past * onwards.signum();
+        let place = event.parameter + past;
         let beyond = |station: &&Station| {
             station.negative == 0 && (station.parameter - event.parameter) * onwards > 0.0
         };
         let from = crossing.iter().find(beyond).unwrap_or(&event.station);
         let proceed = &mut || (self.proceed)(0, place);
-        let found = self
-            .continuation
-            .descend(from, &event.mode, place, proceed)?;
-        let (problem, program) = self.family.meshed(place)?;
-        let equilibrium = of_solution(&problem, program, found);
-        let is_converged = equilibrium.status == Status::Converged;
-        is_converged.then_some(Snapped { place, equilibrium })
+        let (problem, program) = family.meshed(place)?;
+        let found = family
+            .continuation(self.pace)
+            .descend(from, &event.mode, place, proceed);
+        let here = match found {
+            Some(found) => of_solution(&problem, program, found),
+            None => minimum_next_to_on(&problem, &family.mesh, &from.at.point, proceed),
+        };
+        let equilibrium = match here.status {
+            Status::Converged => here,
+            // There, other edges may hold the ribs.
+            _ => {
+                let shape = &here.solved.as_ref()?.at.point;
+                let near = minimum_next_to_on(&problem, &family.mesh, shape, proceed);
+                match near.status {
+                    Status::Converged => near,
+                    _ => solve_near(&problem, &family.mesh, shape, proceed),
+                }
+            }
+        };
+        let solved = equilibrium.certified().ok()?;
+        let objective = solved.values.objective;
+        let rate = before.map_or(0.0, |before| {
+            (event.station.objective - before.objective) / onwards
+        });
+        let led = event.station.objective + rate * past;
+        let units = problem.units();
+        let jump = solved.at.point.distance(&event.station.at.point);
+        (jump >= problem.snap_size()).then(|| Snapped {
+            place,
+            jump: jump * units.length,
+            released: (led - objective) * units.energy,
+            equilibrium,
+        })
     }
+}
+
+/// The states of a stretch.
+fn states(stretch: &Stretch) -> impl Iterator<Item = State> {
+    let mesh = Arc::new(stretch.family.mesh.clone());
+    let stations = stretch.stations.iter();
+    stations.map(move |station| State::of(station, Arc::clone(&mesh)))
+}
+
+/// The end of a branch, given its last stretch: through the flat belt the branch would go over into its mirror image.
+fn without_mirror_image(last: &mut Stretch, end: End) -> End {
+    let reached = last.stations.last().map(|station| station.parameter);
+    let is_open = matches!(end, End::Event | End::Lost);
+    let is_near_limit = reached.is_some_and(|place| last.family.is_near_limit(place));
+    if !is_open || !is_near_limit {
+        return end;
+    }
+    last.events.retain(|(_, event)| event.turn != Turn::Apex);
+    End::Taut
 }
 
 /// The last station at a distance of at least `far` before an event, else the first.
@@ -271,7 +358,8 @@ fn lies_between(station: &Station, [a, b]: [&State; 2], settings: &CrossingSetti
             .map(|pose| pose.position)
             .collect::<Vec<_>>()
     };
-    (0.0..=1.0).contains(&share) && {
+    let is_as_stable = [a, b].map(|state| state.negative_modes == station.negative);
+    (0.0..=1.0).contains(&share) && is_as_stable.contains(&true) && {
         let between = point(a)
             .into_iter()
             .zip(point(b))

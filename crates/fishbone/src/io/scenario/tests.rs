@@ -480,7 +480,7 @@ fn an_unknown_field_is_named_with_its_path_and_the_field_meant() {
         (
             "tolerance = 1e-8",
             "\"tol\\n\" = 1e-8",
-            "solver.tol\\n: unknown field, allowed: method, accuracy, elements, tolerance, bulge, ritz",
+            "solver.tol\\n: unknown field, allowed: method, accuracy, elements, tolerance, snap_size, bulge, ritz",
         ),
     ]);
 }
@@ -1061,6 +1061,11 @@ fn a_solver_setting_outside_its_range_is_refused() {
             "elements = 80",
             "accuracy = 0.2",
             "solver.accuracy: found 0.2, must be from 1e-6 to 1e-1",
+        ),
+        (
+            "elements = 80",
+            "snap_size = -0.1",
+            "solver.snap_size: found -0.1, must be from 0.0 to 10.0",
         ),
         (
             "tolerance = 1e-8",

@@ -17,6 +17,8 @@ const TOLERANCES: RangeInclusive<f64> = 1e-13..=1e-2;
 
 /// Estimated errors that may be asked for, relative.
 const ACCURACIES: RangeInclusive<f64> = 1e-6..=0.1;
+/// Smallest snaps that may be asked for, in V.
+const SNAP_SIZES: RangeInclusive<f64> = 0.0..=10.0;
 /// Elements of the mesh, a number.
 const ELEMENTS: RangeInclusive<usize> = 4..=100_000;
 /// Basis functions of each unknown of the Ritz method, a number.
@@ -148,6 +150,12 @@ impl SolverSpec {
             ACCURACIES.contains(&accuracy),
             format_args!("solver.accuracy"),
             || (number(accuracy), span(&ACCURACIES)),
+        )?;
+        let snap_size = self.snap_size;
+        require(
+            SNAP_SIZES.contains(&snap_size),
+            format_args!("solver.snap_size"),
+            || (number(snap_size), span(&SNAP_SIZES)),
         )?;
         finite_vector(format_args!("solver.bulge"), &self.bulge)?;
         let norm = Vector3::from(self.bulge).norm();
