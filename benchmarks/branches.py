@@ -63,7 +63,8 @@ def level(coarse: Equilibrium) -> Level | None:
     fine = coarse.refined(2 * (len(coarse.u) - 1))
     if fine is None or abs(fine.energy - coarse.energy) > MESH * abs(coarse.energy):
         return None
-    apart = np.linalg.norm(fine.position[::2] - coarse.position, axis=1)
+    there = np.stack([np.interp(coarse.u, fine.u, component) for component in fine.position.T], axis=1)
+    apart = np.linalg.norm(there - coarse.position, axis=1)
     return None if np.max(apart) > NEAR else Level(coarse.energy, fine.energy)
 
 

@@ -17,7 +17,7 @@ class _Budget(NamedTuple):
     """Sizes of a search smaller than the default: it takes seconds, and misses equilibria."""
 
     sums: int
-    """Number of sums of waves among the starts."""
+    """Greatest number of sums of waves among the starts."""
     perturbed: int
     """Greatest number of minima that are perturbed."""
     continued: int
@@ -27,8 +27,8 @@ class _Budget(NamedTuple):
 def branches(scenario: Scenario, *, progress: Callable[[int, int], object] | None = None) -> list[Equilibrium]:
     """The equilibria found of a scenario, rising in energy: minima, and saddles with one or two negative modes.
 
-    More than 4100 searches, from waves of bend and rib slope over the length of the belt, find minima. Perturbations of
-    these minima along their lowest modes lead to more minima. Continuation in modal loads leads from the 16 lowest
+    Some 1100 to 4100 searches, from waves of bend and rib slope over the length of the belt, find minima. Perturbations
+    of these minima along their lowest modes lead to more minima. Continuation in modal loads leads from the 4 lowest
     equilibria to saddles, and the solver goes downhill from each saddle to either side. Equilibria that are unconfirmed
     on refinement, by a mesh twice as fine, are left out; of equilibria that the mesh does not resolve the lowest is
     kept. Of two mirror images the list has the one on the side of the scenario's `bulge`. A belt may pass through

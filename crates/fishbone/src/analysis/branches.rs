@@ -53,15 +53,16 @@ pub fn branches(
     watch: &dyn Watch,
 ) -> Vec<Equilibrium> {
     let proceed = &mut || watch.proceed();
-    let (asked, meshed) = (problem, problem.with_elements(problem.elements()));
-    let problem = meshed.as_ref().unwrap_or(asked);
-    let first = crate::solve::solve(problem, proceed);
+    let plain = crate::solve::solve(problem, proceed);
     let is_intrinsic = problem.scenario().solver.method == Method::Intrinsic;
-    if first.status == Status::Infeasible || !is_intrinsic {
-        return vec![crate::solve::solve(asked, proceed)];
+    if plain.status == Status::Infeasible || !is_intrinsic {
+        return vec![plain];
     }
+    let on_mesh = |elements| problem.with_elements(elements).ok();
+    let fine = on_mesh(problem.elements()).unwrap_or_else(|| problem.clone());
+    let rough = on_mesh(settings.elements.min(problem.elements())).unwrap_or_else(|| fine.clone());
     let mut census = Census {
-        problem,
+        problem: &rough,
         settings,
         run,
         watch,
@@ -69,16 +70,17 @@ pub fn branches(
         done: AtomicUsize::new(0),
         planned: 0,
     };
-    census.enter(first);
+    census.enter(crate::solve::solve(&rough, proceed));
     census.start();
     census.perturb();
     census.load();
+    census.promote(&fine);
     census.confirm();
     census.face();
-    census.refine(asked);
+    census.refine(problem, &plain);
     let mut found = census.found;
     if found.is_empty() {
-        return vec![crate::solve::solve(asked, proceed)];
+        return vec![plain];
     }
     found.sort_by(|a, b| a.energy.total_cmp(&b.energy));
     found
@@ -157,13 +159,26 @@ impl Census<'_> {
         known[before..].to_vec()
     }
 
-    /// Minimises from many starts.
+    /// Minimises from many starts, and from more as long as they lead to anything new.
     fn start(&mut self) {
-        let problem = self.problem;
-        let starts = starts::starts(problem, self.settings);
-        let watch = self.watch;
-        let found = self.each(&starts, |start| {
-            minimum_from(problem, start, &mut || watch.proceed())
+        let (problem, settings) = (self.problem, self.settings);
+        self.minimise(&starts::arches(problem, settings));
+        let mut tried = 0;
+        let mut is_fruitful = true;
+        while is_fruitful && tried < settings.sums {
+            let next = settings.sums.min(tried + settings.batch);
+            let known = self.found.len();
+            self.minimise(&starts::sums(problem, tried..next));
+            is_fruitful = self.found.len() > known;
+            tried = next;
+        }
+    }
+
+    /// Minimises from each of some starts.
+    fn minimise(&mut self, starts: &[BeltPoint]) {
+        let (problem, settings, watch) = (self.problem, self.settings, self.watch);
+        let found = self.each(starts, |start| {
+            minimum_from(problem, start, &mut settings.budget(watch))
         });
         for equilibrium in found {
             self.enter(equilibrium);
@@ -227,8 +242,21 @@ impl Census<'_> {
         }
     }
 
-    /// Keeps the equilibria that are confirmed on a mesh twice as fine; of equilibria that this mesh does not separate, and of
-    /// those that differ by sliding, the lowest.
+    /// Replaces the equilibria by those to which they lead on the mesh of another problem.
+    fn promote(&mut self, problem: &Problem) {
+        let mut found = std::mem::take(&mut self.found);
+        found.sort_by(|a, b| a.energy.total_cmp(&b.energy));
+        let watch = self.watch;
+        let led_to = self.each(&found, |found| {
+            found.led_to(problem, &mut || watch.proceed())
+        });
+        for equilibrium in led_to.into_iter().flatten() {
+            self.enter(equilibrium);
+        }
+    }
+
+    /// Keeps the equilibria that are confirmed on a mesh twice as fine; of equilibria that this mesh does not separate the
+    /// lowest.
     fn confirm(&mut self) {
         let mut found = std::mem::take(&mut self.found);
         found.sort_by(|a, b| a.energy.total_cmp(&b.energy));
@@ -244,9 +272,7 @@ impl Census<'_> {
             let change = (fine.energy - found.energy).abs();
             let is_known = |(known, own): &(Equilibrium, f64)| {
                 let is_level = (known.energy - fine.energy).abs() <= change.max(*own);
-                settings.is_same(known, &fine)
-                    || settings.is_slid(known, &fine)
-                    || (is_level && settings.is_like(known, &fine))
+                settings.is_same(known, &fine) || (is_level && settings.is_like(known, &fine))
             };
             if !known.iter().any(is_known) {
                 known.push((fine, change));
@@ -255,15 +281,23 @@ impl Census<'_> {
         }
     }
 
-    /// Replaces the minima by those on meshes that follow the error, where the problem asks for that.
-    fn refine(&mut self, asked: &Problem) {
+    /// Replaces the minima by those to which they lead on meshes that follow the error, where the problem asks for that; of
+    /// equilibria that these meshes do not separate the lowest. The result of a plain solve is among the equilibria.
+    fn refine(&mut self, asked: &Problem, plain: &Equilibrium) {
         let found = std::mem::take(&mut self.found);
         let (settings, watch) = (self.settings, self.watch);
-        self.found = self.each(&found, |found| {
-            let refined = found.refined_for(asked, &mut || watch.proceed());
-            let same = refined.filter(|refined| settings.is_like(found, refined));
-            same.unwrap_or_else(|| found.clone())
+        let mut refined = self.each(&found, |found| {
+            let refined = found.refined_for(asked, &mut settings.budget(watch));
+            refined.unwrap_or_else(|| found.clone())
         });
+        refined.sort_by(|a, b| a.energy.total_cmp(&b.energy));
+        self.enter(plain.clone());
+        for equilibrium in refined {
+            let is_known = |known: &Equilibrium| settings.is_unresolved(known, &equilibrium);
+            if !self.found.iter().any(is_known) {
+                self.enter(equilibrium);
+            }
+        }
     }
 
     /// Replaces a minimum by its mirror image if the image meets the supports too and bulges more along `solver.bulge`.
@@ -345,7 +379,7 @@ fn perturbed_along(
     };
     let far = settings.perturbations.iter();
     far.map(|far| stagewise::moved(&solved.program, &solved.at.point, mode, *far))
-        .map(|start| minimum_from(problem, &start, &mut || watch.proceed()))
+        .map(|start| minimum_from(problem, &start, &mut settings.budget(watch)))
         .collect()
 }
 
@@ -391,7 +425,7 @@ fn downhill(
         [off, -off].map(|off| stagewise::moved(program, &saddle.point, &mode, off))
     });
     sides
-        .map(|side| minimum_from(problem, &side, &mut || watch.proceed()))
+        .map(|side| minimum_from(problem, &side, &mut settings.budget(watch)))
         .collect()
 }
 

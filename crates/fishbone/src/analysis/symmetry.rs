@@ -47,17 +47,29 @@ pub(crate) fn are_images_slid(
     slid(0.5 * (low + high)) <= within
 }
 
+/// Poses of a shape at given places of its spine. `u` are the arc lengths of its nodes, in U.
+pub(crate) fn sampled(poses: &[Pose], u: &[f64], places: &[f64]) -> Vec<Pose> {
+    places
+        .iter()
+        .map(|place| pose_at(poses, u, *place))
+        .collect()
+}
+
+/// The pose at a place between two nodes, on the screw from one to the other.
+fn pose_at(poses: &[Pose], u: &[f64], place: f64) -> Pose {
+    let k = u.partition_point(|u| *u <= place).clamp(1, u.len() - 1) - 1;
+    let step = (poses[k + 1] * poses[k].inverse()).log();
+    let share = (place - u[k]) / (u[k + 1] - u[k]);
+    Pose::exp(&(step * share)) * poses[k]
+}
+
 /// The shape of a closed belt whose nodes have moved on along the spine, less than once round.
 fn slid(poses: &[Pose], u: &[f64], half_turns: i32, by: f64) -> Vec<Pose> {
     let flip = if half_turns % 2 == 0 { 1.0 } else { -1.0 };
     let across_seam = Matrix3::from_diagonal(&Vector3::new(flip, 1.0, flip));
     let at = |u_node: &f64| {
         let whole = u_node + by;
-        let place = whole % 1.0;
-        let k = u.partition_point(|u| *u <= place).clamp(1, u.len() - 1) - 1;
-        let step = (poses[k + 1] * poses[k].inverse()).log();
-        let share = (place - u[k]) / (u[k + 1] - u[k]);
-        let pose = Pose::exp(&(step * share)) * poses[k];
+        let pose = pose_at(poses, u, whole % 1.0);
         match whole.floor() as i32 % 2 {
             0 => pose,
             _ => Pose {

@@ -240,14 +240,24 @@ impl Equilibrium {
     ) -> Option<Self> {
         /// Displacement of nodes up to which the refined shape is the same equilibrium, in U.
         const NEAR: f64 = 0.1;
-        let solved = self.solved.as_ref()?;
         let problem = self.problem.with_elements(elements).ok()?;
-        let program = problem.program(elements);
+        let found = self.led_to(&problem, proceed)?;
+        (self.displacement(&found) <= NEAR).then_some(found)
+    }
+
+    /// The equilibrium, minimum or not, to which this one leads on the uniform mesh of another problem of the same belt;
+    /// `None` if it leads to none.
+    pub(crate) fn led_to(
+        &self,
+        problem: &Problem,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Option<Self> {
+        let solved = self.solved.as_ref()?;
+        let program = problem.program(problem.elements());
         let shape = search::prolong(&solved.program, &solved.at.point, &program);
         if self.stability.is_none_or(|s| s.negative_modes == 0) {
-            let found = minimum_next_to(&problem, &shape, proceed);
-            let is_near = self.displacement(&found) <= NEAR;
-            return (found.status == Status::Converged && is_near).then_some(found);
+            let found = minimum_next_to(problem, &shape, proceed);
+            return (found.status == Status::Converged).then_some(found);
         }
         let (from, multipliers) = (&solved.program, &solved.at.multipliers);
         let at = Stationary {
@@ -263,7 +273,7 @@ impl Equilibrium {
         };
         let solution = stagewise::settle(&program, problem.tolerance(), at)?;
         let is_like = solution.inertia == solved.inertia;
-        is_like.then(|| of_solution(&problem, program, solution))
+        is_like.then(|| of_solution(problem, program, solution))
     }
 }
 

@@ -1,19 +1,26 @@
 //! Settings of the search for all equilibria: its extent, and its tolerances for equal equilibria.
 
-use super::height;
-use crate::analysis::symmetry::{SAME, are_images, are_images_slid};
+use super::{Watch, height};
+use crate::analysis::symmetry::{SAME, are_images, are_images_slid, sampled};
 use crate::equilibrium::{Equilibrium, Solved};
+use std::ops::ControlFlow;
 
 /// Extent of the search and its tolerances for equal equilibria; with the defaults it finds all that are known of the
 /// scenarios tried.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SearchSettings {
+    /// Greatest number of elements of the mesh on which the search goes on until its equilibria are confirmed.
+    pub elements: usize,
+    /// Greatest count of iterations of a search for a minimum, a number.
+    pub iterations: usize,
     /// Waves of bend, laid over every arch and the straight belt; amplitudes in 1/U.
     pub bend_waves: Vec<Wave>,
     /// Waves of rib slope, each laid over with every wave of bend; amplitudes, a number.
     pub slope_waves: Vec<Wave>,
-    /// Sums of waves from which the search starts as well, a number.
+    /// Greatest count of sums of waves from which the search starts as well, a number.
     pub sums: usize,
+    /// Sums of waves at a time, a number: the search goes on to the next as long as such a batch leads to anything new.
+    pub batch: usize,
     /// Greatest count of perturbed minima, a number.
     pub perturbed: usize,
     /// Modes along which a minimum is perturbed, a number.
@@ -66,6 +73,8 @@ impl Default for SearchSettings {
             waves.iter().map(wave).collect()
         };
         Self {
+            elements: 80,
+            iterations: 300,
             bend_waves: waves(&[
                 (0.0, 0.0),
                 (0.0, 4.0),
@@ -79,12 +88,13 @@ impl Default for SearchSettings {
             ]),
             slope_waves: waves(&[(1.0, 0.0), (1.0, 0.5), (1.0, -0.5), (2.0, 0.5), (2.0, -0.5)]),
             sums: 4000,
-            perturbed: 96,
+            batch: 1024,
+            perturbed: 32,
             perturbed_modes: 4,
             perturbations: vec![0.1, -0.1, 0.3, -0.3],
-            continued: 16,
+            continued: 4,
             at_a_time: 4,
-            loaded_modes: [6, 4, 0],
+            loaded_modes: [4, 3, 0],
             off_saddle: 0.01,
             refinement: 2,
             same_level: 1e-4,
@@ -99,14 +109,26 @@ impl Default for SearchSettings {
 }
 
 impl SearchSettings {
+    /// Whether to go on with a search for a minimum, asked once an iteration.
+    pub(super) fn budget(&self, watch: &dyn Watch) -> impl FnMut() -> ControlFlow<()> {
+        let mut left = self.iterations;
+        move || match left.checked_sub(1) {
+            Some(less) => {
+                left = less;
+                watch.proceed()
+            }
+            None => ControlFlow::Break(()),
+        }
+    }
+
     /// Greatest number of negative modes of a reported equilibrium.
     pub(super) fn highest_index(&self) -> usize {
         self.loaded_modes.len() - 1
     }
 
-    /// Whether two equilibria are the same but for a symmetry.
+    /// Whether two equilibria are the same but for a symmetry, or for sliding along themselves.
     pub(super) fn is_same(&self, a: &Equilibrium, b: &Equilibrium) -> bool {
-        self.is_within(a, b, self.same_level, self.same_distance)
+        self.is_within(a, b, self.same_level, self.same_distance) || self.is_slid(a, b)
     }
 
     /// Whether two equilibria may be the same but for a symmetry and the mesh.
@@ -114,29 +136,33 @@ impl SearchSettings {
         self.is_within(a, b, self.like_level, self.like_distance)
     }
 
+    /// Whether two equilibria differ by no more than the error that their meshes make of one of them.
+    pub(super) fn is_unresolved(&self, a: &Equilibrium, b: &Equilibrium) -> bool {
+        let error = |e: &Equilibrium| e.error().map_or(0.0, |error| error.energy * self.size(e));
+        self.is_like(a, b) && (a.energy - b.energy).abs() <= error(a).max(error(b))
+    }
+
     /// Whether two equilibria differ by no more than a share of the energy and a distance in U, and in no number of negative
     /// modes.
-    pub(super) fn is_within(
-        &self,
-        a: &Equilibrium,
-        b: &Equilibrium,
-        share: f64,
-        distance: f64,
-    ) -> bool {
+    fn is_within(&self, a: &Equilibrium, b: &Equilibrium, share: f64, distance: f64) -> bool {
+        let places: Vec<f64> = (0..PLACES)
+            .map(|k| (k as f64 + 0.5) / PLACES as f64)
+            .collect();
+        let shape = |of: &Solved| sampled(&of.at.point.poses, &of.program.nodes(), &places);
         self.is_level(a, b, share)
-            && solved(a, b)
-                .is_some_and(|[a, b]| are_images(&a.at.point.poses, &b.at.point.poses, distance))
+            && solved(a, b).is_some_and(|[a, b]| are_images(&shape(a), &shape(b), distance))
     }
 
     /// Whether two equilibria are the same but for a symmetry and for sliding along themselves.
-    pub(super) fn is_slid(&self, a: &Equilibrium, b: &Equilibrium) -> bool {
+    fn is_slid(&self, a: &Equilibrium, b: &Equilibrium) -> bool {
         let is_slid = |[a, b]: [&Solved; 2]| {
             let half_turns = a.program.slides()?;
-            let [of_a, of_b] = [a, b].map(|solved| &solved.at.point.poses);
-            let u = a.program.nodes();
+            let u: Vec<f64> = (0..=PLACES).map(|k| k as f64 / PLACES as f64).collect();
+            let [of_a, of_b] =
+                [a, b].map(|of| sampled(&of.at.point.poses, &of.program.nodes(), &u));
             Some(are_images_slid(
-                of_a,
-                of_b,
+                &of_a,
+                &of_b,
                 &u,
                 half_turns,
                 self.same_distance,
@@ -164,6 +190,9 @@ impl SearchSettings {
         height(one) > height(other) + self.higher * one.spine.length()
     }
 }
+
+/// Places of the spine at which two shapes are compared, a number.
+const PLACES: usize = 80;
 
 /// The solutions of two equilibria, if both have one.
 fn solved<'a>(a: &'a Equilibrium, b: &'a Equilibrium) -> Option<[&'a Solved; 2]> {

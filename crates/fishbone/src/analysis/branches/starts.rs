@@ -6,10 +6,11 @@ use crate::problem::Problem;
 use crate::problem::program::BeltPoint;
 use nalgebra::Vector2;
 use std::f64::consts::PI;
+use std::ops::Range;
 
-/// Shapes from which to search: arches to both sides and the straight belt with waves of bend and of rib slope over them,
-/// then sums of waves that cover their space evenly.
-pub(super) fn starts(problem: &Problem, settings: &SearchSettings) -> Vec<BeltPoint> {
+/// Shapes from which to search first: arches to both sides and the straight belt with waves of bend and of rib slope over
+/// them.
+pub(super) fn arches(problem: &Problem, settings: &SearchSettings) -> Vec<BeltPoint> {
     let program = problem.program(problem.elements());
     let bulge = problem.bulge();
     let [up, down] = [bulge, -bulge].map(|bulge| guess(&program, &bulge));
@@ -23,11 +24,18 @@ pub(super) fn starts(problem: &Problem, settings: &SearchSettings) -> Vec<BeltPo
             }
         }
     }
-    starts.extend((0..settings.sums).map(|i| {
-        let sum = Sum::new(i);
-        waved(&program, &up, 0.0, &|u| sum.at(u))
-    }));
     starts
+}
+
+/// Shapes from which to search then, some of a sequence: sums of waves that cover their space evenly.
+pub(super) fn sums(problem: &Problem, which: Range<usize>) -> Vec<BeltPoint> {
+    let program = problem.program(problem.elements());
+    let straight = guess(&program, &problem.bulge());
+    let start = |i| {
+        let sum = Sum::new(i);
+        waved(&program, &straight, 0.0, &|u| sum.at(u))
+    };
+    which.map(start).collect()
 }
 
 impl Wave {
