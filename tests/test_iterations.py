@@ -10,17 +10,17 @@ import fishbone as fb
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 ITERATIONS = {
-    "bent": 33,
+    "bent": 19,
     "cantilever": 14,
     "curl": 18,
     "curved": 24,
-    "example1": 30,
+    "example1": 19,
     "example2": 31,
     "hinge": 83,
     "mobius": 71,
     "planar": 10,
     "polystyrene": 25,
-    "twist": 89,
+    "twist": 65,
 }
 """Iterations over all attempts, as of the last intended change of the solver."""
 PLAY = 2

@@ -96,7 +96,8 @@ impl Estimate {
         const OVER_CHANGE: f64 = 1.2;
         let fine = problem.program_on(&Mesh::of(problem, program).halved())?;
         // On an arc, ribs that nearly meet in an element meet in one of its halves.
-        let ribs_meet = fine.least_slack(&prolonged(program, &at.point, &fine)) <= 0.0;
+        let here = prolonged(program, &at.point, &fine);
+        let ribs_meet = fine.least_slack(&here) <= 0.0;
         let near = prolonged_with_multipliers(program, at, &fine);
         let own = Quantities::of(
             problem,
@@ -116,7 +117,7 @@ impl Estimate {
             false if may_turn_over => searched_near(problem, &fine, &near.point, proceed),
             false => None,
         };
-        if let Some(solution) = solution {
+        if let Some(solution) = solution.filter(|found| is_next_to(found, &here)) {
             let Stationary { point, multipliers } = solution.at;
             better = (point, multipliers.equalities, solution.values.objective);
             error = own.off_on(problem, &fine, &better);
@@ -147,8 +148,7 @@ impl Estimate {
     }
 }
 
-/// The equilibrium of a programme next to a point: by Newton's method, else the minimum that a search from there finds;
-/// `None` where both find another one.
+/// The equilibrium of a programme near to a point: by Newton's method, else the minimum that a search from there finds.
 fn solved_near(
     problem: &Problem,
     program: &BeltProgram,
@@ -156,11 +156,10 @@ fn solved_near(
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Option<Solution<BeltPoint>> {
     stagewise::settle(program, problem.tolerance(), near.clone())
-        .filter(|found| is_next_to(found, &near.point))
         .or_else(|| searched_near(problem, program, &near.point, proceed))
 }
 
-/// The minimum of a programme that a search finds next to a point; `None` where it finds another one.
+/// The minimum of a programme that a search from a point finds.
 fn searched_near(
     problem: &Problem,
     program: &BeltProgram,
@@ -170,7 +169,7 @@ fn searched_near(
     let search = Search::of(problem);
     let barrier = search.settings.warm_barrier;
     let found = search.only_from(program, near.clone(), barrier, proceed);
-    (found.outcome == Outcome::Converged && is_next_to(&found, near)).then_some(found)
+    (found.outcome == Outcome::Converged).then_some(found)
 }
 
 /// Whether a solution is not another equilibrium than the one that a point is close to.

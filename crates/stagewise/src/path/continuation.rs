@@ -122,9 +122,11 @@ impl<'a, F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
                 break;
             };
             let first = &curve.stations[0];
-            let closing = match curve.stations.len() {
-                1 => None,
-                _ => self.closing(first, last, &step),
+            // A curve that begins at an end of the range leaves the range where it would be closed.
+            let is_inside = self.range[0] < first.parameter && first.parameter < self.range[1];
+            let closing = match curve.stations.len() > 1 && is_inside {
+                true => self.closing(first, last, &step),
+                false => None,
             };
             if let Some(length) = closing {
                 step.station = first.clone();

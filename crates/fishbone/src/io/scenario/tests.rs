@@ -449,7 +449,7 @@ fn an_unknown_field_is_named_with_its_path_and_the_field_meant() {
             "position = [0.0, 0.5, 0.1]",
             "positon = [0.0, 0.5, 0.1]",
             "supports[1].positon: unknown field, did you mean \"position\"? allowed: at, position, rotation, euler, \
-             quaternion, hinge, square_rib",
+             quaternion, hinge, moment, square_rib",
         ),
         (
             STRAIGHT,
@@ -1065,7 +1065,7 @@ fn a_solver_setting_outside_its_range_is_refused() {
         (
             "elements = 80",
             "snap_size = -0.1",
-            "solver.snap_size: found -0.1, must be from 0.0 to 10.0",
+            "solver.snap_size: found -0.1, must be from 0e0 to 1e1",
         ),
         (
             "tolerance = 1e-8",
