@@ -80,7 +80,7 @@ CASES = {
             "reason": "unknown_field",
             "field": "supports[1].positon",
             "allowed": "at, position, rotation, euler, quaternion, hinge, moment, square_rib",
-            "choices": ("at", "position", "rotation", "euler", "quaternion", "hinge", "square_rib"),
+            "choices": ("at", "position", "rotation", "euler", "quaternion", "hinge", "moment", "square_rib"),
             "nearest": "position",
             "file": None,
         },

@@ -293,7 +293,7 @@ def test_cantilever_under_its_weight_has_derivatives_where_it_bends() -> None:
     ids=["into an arc", "tight arc"],
 )
 def test_change_by_the_width_counts_edges_beside_a_bend(energy: Energy, segments: list[Json], end: Json) -> None:
-    scenario = board(segments, [CLAMP, end], energy=energy, width=0.06, elements=160)
+    scenario = board(segments, [CLAMP, end], energy=energy, width=0.06, elements=120)
     scenario["solver"]["tolerance"] = TOLERANCE
     check(scenario, {"width": 1.0})
 

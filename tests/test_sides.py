@@ -44,7 +44,7 @@ def test_no_pose_of_a_sweep_flips_the_side(holds: str) -> None:
         assert belts[0].energy == pytest.approx(belts[1].energy, rel=1e-6)
         # Between hinges there are two such pairs: the ends may change places too.
         if holds == "clamped":
-            assert np.allclose(belts[0].position, mirrored(belts[1]), atol=1e-6)
+            assert np.allclose(belts[0].position, mirrored(belts[1]), atol=1e-5)
 
 
 def test_a_twin_that_exchanges_the_ends_is_found() -> None:

@@ -223,8 +223,9 @@ fn test_belts_near_the_inextensible_limit_are_warned_of_and_belts_with_slack_are
     let without_slack = at(1.0);
     assert_eq!(without_slack.status, Status::Converged);
     let warnings = without_slack.warnings();
-    assert!(warnings[0].contains("slack"), "{warnings:?}");
-    assert!(without_slack.reactions[1].wrench.force.norm() < 1e-6);
+    assert!(warnings[0].contains("not determined"), "{warnings:?}");
+    let force = without_slack.reactions[1].wrench.force;
+    assert!(force.x.abs() < 1e-6 && force.y.is_nan(), "{force}");
 }
 
 #[test]
