@@ -168,10 +168,10 @@ def verdicts() -> Iterator[list[str]]:
     yield ["flat quarter arc held at one end: stable", "no", str(flat.stable).lower(), "true", "energy 0"]
     turned = solve([clamp("start", ORIGIN), {"at": "end", "rotation": [0.0, 0.0, 2.0 * math.pi]}])
     yield ["end turned by 2π: energy", "0, no warning", f"{turned.energy:.4f}", "19.7392, or a warning", "circle"]
-    taut = solve([clamp("start", ORIGIN), clamp("end", [0.0, 1.0, 0.0])])
-    force = abs(taut.reaction("end").force[1])
-    after = f"{force:.3g}, {'warning' if taut.warnings else 'no warning'}"
-    yield ["taut between clamps: reaction", "0", after, "not determined, warning", "inextensible"]
+    straight = solve([clamp("start", ORIGIN), clamp("end", [0.0, 1.0, 0.0])])
+    force = abs(straight.reaction("end").force[1])
+    after = f"{force:.3g}, {'warning' if straight.warnings else 'no warning'}"
+    yield ["no slack between clamps: reaction", "0", after, "not determined, warning", "inextensible"]
     twisted = solve([clamp("start", ORIGIN), clamp("end", [0.0, 1.0, 0.0], [0.0, QUARTER, 0.0])], width=0.2)
     after = f"{twisted.status.replace('_', ' ')} after {twisted.iterations} iterations"
     yield ["quarter twist without slack", "not converged after 2803", after, "infeasible at once", "inextensible"]

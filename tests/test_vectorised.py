@@ -64,8 +64,12 @@ def test_kernels_of_elements_take_all_lanes_at_a_time(kernels, registers, more_t
 
 
 def test_kernels_of_stages_work_on_several_numbers_at_a_time(kernels):
+    odd = 0
     for counts in kernels:
         numbers = {registers: width * counts[registers] for registers, width in WIDTHS.items()}
         # Of the elimination of belts 0.07 is scalar: pivots are divided by one after the other. Of that of the
         # programme that proves flat parts stable it is 0.18, and 0.22 of a step there: its odd size leaves a remainder.
-        assert numbers["scalar"] < 0.25 * sum(numbers.values()), counts
+        share = numbers["scalar"] / sum(numbers.values())
+        assert share < 0.25, counts
+        odd += share >= 0.15
+    assert odd <= 2, kernels

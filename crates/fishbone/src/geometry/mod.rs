@@ -163,7 +163,7 @@ pub(crate) fn magnus(twist_1: &Twist, twist_2: &Twist, h: f64) -> Twist {
 /// dimensionless.
 ///
 /// A fourth-order step along which the bend changes from −a to a is longer than its arc, by as much as the arc is longer
-/// than its true chord. A taut belt would gain by such a zigzag of its bend. The term of the sixth-order step that makes the
+/// than its true chord. A belt under tension would gain by such a zigzag of its bend. The term of the sixth-order step that makes the
 /// chord as short as it is, [δ, [δ, ξ]] h³/80 with the rise δ of the twist, is therefore kept, of the translation along η.
 ///
 /// Source: S. Blanes, F. Casas, J. A. Oteo, J. Ros, "The Magnus expansion and some of its applications" (2009), Sec. 5.4
