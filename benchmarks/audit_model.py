@@ -118,7 +118,7 @@ def density(model: str, fields: tuple[Any, ...], board: tuple[Any, ...]) -> Any:
     (bend, slope, mean, rate), (rigidity, geodesic, natural, poisson, width) = fields, board
     square = 1.0 + slope**2
     bending = (bend * square) ** 2
-    factor = 1.0
+    factor = long = area = 1.0
     if model == "wunderlich":
         s = rate + geodesic * (1.0 + mean**2)
         low, high = (rib_end(geodesic, 1.0 + mean**2, width, side) for side in (-1.0, 1.0))
@@ -130,16 +130,20 @@ def density(model: str, fields: tuple[Any, ...], board: tuple[Any, ...]) -> Any:
             logarithm = np.log(ratio)
         series = (high - low) + s * (high**2 - low**2) / 2.0 + s**2 * (high**3 - low**3) / 3.0
         factor = np.where(small, series, logarithm / safe) / width
-    curled = natural**2 - 2.0 * natural * square * bend + 2.0 * (1.0 - poisson) * natural * slope**2 * bend
+        # Of the strip between two ribs, (1 − s v) dv du is the area: what the natural bend adds is integrated over it.
+        long = (high - low) / width
+        area = long - s * (high**2 - low**2) / (2.0 * width)
+    mixed = -2.0 * natural * square * bend + 2.0 * (1.0 - poisson) * natural * slope**2 * bend
     lengthened = np.sqrt(square) if model == "fishbone" else 1.0
-    return 0.5 * rigidity * (bending * factor + curled) * lengthened
+    return 0.5 * rigidity * (bending * factor + mixed * long + natural**2 * area) * lengthened
 
 
 def rib_end(geodesic: Any, square: Any, width: float, side: float) -> Any:
-    """Where a rib meets the edge on a side: v of v − κ_g v² (1 + β²)/2 = ±V/2 − κ_g V²/8."""
+    """Where a rib meets the edge on a side: v of v − κ_g v² (1 + β²)/2 = ±V/2 − κ_g V²/8; no number where it passes by."""
     reach = side * width / 2.0 - geodesic * width**2 / 8.0
     # Twice the reach over one and the root has no difference of near numbers.
-    return 2.0 * reach / (1.0 + np.sqrt(1.0 - 2.0 * geodesic * square * reach))
+    with np.errstate(invalid="ignore"):
+        return 2.0 * reach / (1.0 + np.sqrt(1.0 - 2.0 * geodesic * square * reach))
 
 
 class Shape:

@@ -16,7 +16,7 @@ ITERATIONS = {
     "curved": 24,
     "example1": 19,
     "example2": 31,
-    "hinge": 83,
+    "hinge": 103,
     "mobius": 71,
     "planar": 10,
     "polystyrene": 25,

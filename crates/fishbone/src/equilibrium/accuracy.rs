@@ -1,5 +1,6 @@
 //! The error that the mesh makes, estimated by one Newton step on the mesh of elements half as long.
 
+use super::refinement::ribs_turn;
 use super::search::{Search, prolonged, prolonged_with_multipliers};
 use crate::problem::program::{BeltPoint, BeltProgram, Piece, Undetermined};
 use crate::problem::{Mesh, Problem};
@@ -94,7 +95,8 @@ impl Estimate {
     ) -> Option<Self> {
         /// Error over its change on halving all elements, dimensionless.
         const OVER_CHANGE: f64 = 1.2;
-        let fine = problem.program_on(&Mesh::of(problem, program).halved())?;
+        let mesh = Mesh::of(problem, program);
+        let fine = problem.program_on(&mesh.halved())?;
         // On an arc, ribs that nearly meet in an element meet in one of its halves.
         let here = prolonged(program, &at.point, &fine);
         let ribs_meet = fine.least_slack(&here) <= 0.0;
@@ -112,15 +114,22 @@ impl Estimate {
         // A density that does not know the width lets ribs turn over anywhere at no cost, and one step does not move the
         // place from element to element.
         let may_turn_over = !program.model.knows_width() && error.largest() <= problem.accuracy();
-        let solution = match ribs_meet || error.largest() > most {
-            true => solved_near(problem, &fine, &near, proceed),
-            false if may_turn_over => searched_near(problem, &fine, &near.point, proceed),
-            false => None,
-        };
-        if let Some(solution) = solution.filter(|found| is_next_to(found, &here)) {
-            let Stationary { point, multipliers } = solution.at;
-            better = (point, multipliers.equalities, solution.values.objective);
-            error = own.off_on(problem, &fine, &better);
+        if ribs_meet || error.largest() > most {
+            let solution = solved_near(problem, &fine, &near, proceed);
+            if let Some(solution) = solution.filter(|found| is_next_to(found, &here)) {
+                let Stationary { point, multipliers } = solution.at;
+                better = (point, multipliers.equalities, solution.values.objective);
+                error = own.off_on(problem, &fine, &better);
+            }
+        } else if may_turn_over {
+            let finest = problem.program_on(&mesh.split(&parts(program, &at.point)))?;
+            let here = prolonged(program, &at.point, &finest);
+            let solution = searched_near(problem, &finest, &here, proceed);
+            if let Some(solution) = solution.filter(|found| is_next_to(found, &here)) {
+                let Stationary { point, multipliers } = solution.at;
+                let best = (point, multipliers.equalities, solution.values.objective);
+                error = own.off_on(problem, &finest, &best);
+            }
         }
         let strips = fine.pieces.iter().enumerate();
         let strips = strips.filter(|(_, piece)| matches!(piece, Piece::Strip(_)));
@@ -146,6 +155,13 @@ impl Estimate {
             curvatures: middles.map(in_element).collect(),
         })
     }
+}
+
+/// Parts of every element of a mesh on which ribs would turn over elsewhere, if that had less energy: four where ribs turn,
+/// as elements half as long may hold them in the same place, and two elsewhere.
+fn parts(program: &BeltProgram, at: &BeltPoint) -> Vec<usize> {
+    let parts = |element| if ribs_turn(at, element) { 4 } else { 2 };
+    program.elements().map(parts).collect()
 }
 
 /// The equilibrium of a programme near to a point: by Newton's method, else the minimum that a search from there finds.

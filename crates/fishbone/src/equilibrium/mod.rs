@@ -256,8 +256,7 @@ impl Equilibrium {
         let program = problem.program(problem.elements());
         let shape = search::prolong(&solved.program, &solved.at.point, &program);
         if self.stability.is_none_or(|s| s.negative_modes == 0) {
-            let found = minimum_next_to(problem, &shape, proceed);
-            return (found.status == Status::Converged).then_some(found);
+            return self.minimum_led_to(problem, &shape, proceed);
         }
         let (from, multipliers) = (&solved.program, &solved.at.multipliers);
         let at = Stationary {
@@ -274,6 +273,36 @@ impl Equilibrium {
         let solution = stagewise::settle(&program, problem.tolerance(), at)?;
         let is_like = solution.inertia == solved.inertia;
         is_like.then(|| of_solution(problem, program, solution))
+    }
+
+    /// The minimum to which this one, prolonged to a shape on the uniform mesh of another problem, leads: of two searches
+    /// from there, where the first leaves it, the nearer minimum.
+    ///
+    /// A search with a low barrier stays near, unless the shape on the other mesh is so rough that it goes astray.
+    fn minimum_led_to(
+        &self,
+        problem: &Problem,
+        shape: &BeltPoint,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Option<Self> {
+        /// Displacement of nodes up to which nothing is left, in U.
+        const SAME: f64 = 1e-3;
+        let mesh = Mesh::uniform(problem, problem.elements());
+        let mut from = |start| {
+            let found = intrinsic::solve(problem, start, proceed);
+            let displacement = self.displacement(&found);
+            (found.status == Status::Converged).then_some((displacement, found))
+        };
+        let close = from(Start::Close(&mesh, shape));
+        let nearest = match close {
+            Some((displacement, _)) if displacement <= SAME => close,
+            _ => {
+                let both = [close, from(Start::Near(&mesh, shape))];
+                let found = both.into_iter().flatten();
+                found.min_by(|a, b| a.0.total_cmp(&b.0))
+            }
+        };
+        nearest.map(|(_, found)| found)
     }
 }
 

@@ -82,12 +82,15 @@ pub(super) fn refine(
             return level;
         }
         failures += usize::from(!level.is_sound());
+        let in_vain = best
+            .as_ref()
+            .is_some_and(|best| level.is_in_vain_after(best));
         mesh = level.better_mesh(problem);
         best = match best {
             Some(best) if best.estimate.is_some() && !level.is_better_than(&best) => Some(best),
             _ => Some(level),
         };
-        if failures > FAILURES || mesh.elements() > MOST {
+        if in_vain || failures > FAILURES || mesh.elements() > MOST {
             break;
         }
     }
@@ -212,6 +215,15 @@ fn first_width(problem: &Problem) -> f64 {
 /// The width of a belt, in U.
 fn width(problem: &Problem) -> f64 {
     problem.belt().width / problem.units().length
+}
+
+/// Whether the ribs of a shape turn fast in an element, as seen by its width.
+pub(super) fn ribs_turn(shape: &BeltPoint, (k, element): (usize, &Element)) -> bool {
+    /// Share of the greatest convergence 2/V from which ribs turn fast, dimensionless.
+    const FAST: f64 = 0.2;
+    let slopes = [k, k + 1].map(|node| shape.fields[node][1]);
+    let (_, convergence) = element.strips().middle(slopes);
+    convergence.abs() * element.half_width > FAST
 }
 
 impl Level {
@@ -393,6 +405,25 @@ impl Level {
         (rank(self), -error(self)) >= (rank(other), -error(other))
     }
 
+    /// Whether the mesh is much finer than another level's, and yet the error much the same: as where a density that does not
+    /// know the width folds the belt into facets, finer ones on a finer mesh.
+    fn is_in_vain_after(&self, other: &Self) -> bool {
+        /// Number of elements up to which further ones may still pay.
+        const FEW: f64 = 1000.0;
+        /// Number of elements over the other's that should have made a difference, dimensionless.
+        const FINER: f64 = 2.0;
+        /// Error over the other's that is much the same, dimensionless.
+        const SAME: f64 = 0.7;
+        let elements = |level: &Self| level.program.elements().count() as f64;
+        let error = |level: &Self| level.estimate.as_ref().map(|e| e.error.largest());
+        let known = |error: &f64| *error <= LARGE;
+        elements(self) >= FEW.max(FINER * elements(other))
+            && match (error(self).filter(known), error(other).filter(known)) {
+                (Some(own), Some(others)) => own > SAME * others,
+                _ => false,
+            }
+    }
+
     /// The largest angle by which an element turns.
     fn turn(&self) -> f64 {
         let elements = self.program.elements();
@@ -409,24 +440,17 @@ impl Level {
         element.length * rate(k).max(rate(k + 1))
     }
 
-    /// Whether the ribs turn fast in an element, as seen by its width.
-    fn ribs_turn(&self, (k, element): (usize, &Element)) -> bool {
-        /// Share of the greatest convergence 2/V from which ribs turn fast, dimensionless.
-        const FAST: f64 = 0.2;
-        let fields = &self.solution.at.point.fields;
-        let (_, convergence) = element.strips().middle([fields[k][1], fields[k + 1][1]]);
-        convergence.abs() * element.half_width > FAST
-    }
-
     /// A mesh for the ribs of the belt at another width, over its own.
     fn mesh_for_ribs(&self, problem: &Problem, times: f64) -> Mesh {
         let short = times * width(problem) / PER_WIDTH;
         let elements = self.program.elements();
         let lengths: Vec<f64> = elements
-            .map(|(k, element)| match self.ribs_turn((k, element)) {
-                true => element.length.min(short),
-                false => element.length.max(LONGEST),
-            })
+            .map(
+                |(k, element)| match ribs_turn(&self.solution.at.point, (k, element)) {
+                    true => element.length.min(short),
+                    false => element.length.max(LONGEST),
+                },
+            )
             .collect();
         Mesh::of(problem, &self.program).graded(problem, &lengths, &[])
     }
@@ -476,7 +500,7 @@ impl Level {
                     true => (AIM * accuracy * tightest / change).sqrt(),
                     false => f64::INFINITY,
                 };
-                let by_ribs = match self.ribs_turn((k, element)) {
+                let by_ribs = match ribs_turn(&self.solution.at.point, (k, element)) {
                     true => 2.0 * element.half_width / (PER_WIDTH * element.length),
                     false => f64::INFINITY,
                 };

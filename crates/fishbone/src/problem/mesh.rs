@@ -34,12 +34,28 @@ impl Mesh {
 
     /// Every element split into two of equal length, with its active edges.
     pub(crate) fn halved(&self) -> Self {
-        let split = |share: &f64| [0.5 * share; 2];
-        let halved = |division: &Division| Division(division.0.iter().flat_map(split).collect());
-        let twice = |piece: &(bool, ActiveEdges)| vec![*piece; if piece.0 { 2 } else { 1 }];
+        self.split(&vec![2; self.elements()])
+    }
+
+    /// Every element split into parts of equal length, with its active edges.
+    ///
+    /// Shapes: `parts` one number an element
+    pub(crate) fn split(&self, parts: &[usize]) -> Self {
+        let mut counts = parts.iter().copied();
+        let divisions = self.divisions.iter().map(|division| {
+            let shares = division.0.iter().zip(counts.by_ref());
+            let split = |(share, parts): (&f64, usize)| vec![share / parts as f64; parts];
+            Division(shares.flat_map(split).collect())
+        });
+        let divisions = divisions.collect();
+        let mut counts = parts.iter().copied();
+        let mut times = |piece: &(bool, ActiveEdges)| match piece.0 {
+            true => vec![*piece; counts.next().unwrap_or(1)],
+            false => vec![*piece],
+        };
         Self {
-            divisions: self.divisions.iter().map(halved).collect(),
-            pieces: self.pieces.iter().flat_map(twice).collect(),
+            divisions,
+            pieces: self.pieces.iter().flat_map(&mut times).collect(),
         }
     }
 

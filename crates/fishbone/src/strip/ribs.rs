@@ -204,11 +204,14 @@ pub(super) fn variables(at: [f64; 2]) -> [Dual2SVec64<2>; 2] {
     [first, second]
 }
 
+/// Argument t below which the square root of a rib that all but misses its inner edge is continued, dimensionless.
+///
+/// Ribs whose root is exact do not cross on the board; so it is small.
+const SMALL: f64 = 1e-3;
+
 /// √t, continued below a small t by a positive function with the same value and first two derivatives: a square root would
 /// end at 0.
 fn continued_root<D: DualNum<Primitive = f64> + Copy>(t: D) -> D {
-    /// Argument t below which the square root is continued, dimensionless.
-    const SMALL: f64 = 0.01;
     if t >= SMALL {
         return t.sqrt();
     }
@@ -379,10 +382,12 @@ mod tests {
 
     #[test]
     fn test_continued_root_has_no_corner() {
-        let h = 1e-4;
+        let h = 1e-2 * SMALL;
         let root = |t: f64| continued_root(t);
         let second = |t: f64| (root(t + h) - 2.0 * root(t) + root(t - h)) / (h * h);
-        assert!((second(0.01 - 1e-9) / second(0.01 + 2.0 * h) - 1.0).abs() < 0.1);
-        assert!(root(-0.05) > 0.0 && (root(0.0099999) - root(0.0100001)).abs() < 1e-5);
+        let below = SMALL * (1.0 - 1e-7);
+        assert!((second(below) / second(SMALL + 2.0 * h) - 1.0).abs() < 0.1);
+        assert!(root(-5.0 * SMALL) > 0.0);
+        assert!((root(below) - root(SMALL * (1.0 + 1e-7))).abs() < 1e-5);
     }
 }

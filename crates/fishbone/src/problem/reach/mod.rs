@@ -278,10 +278,18 @@ fn rounding(scenario: &Scenario, size: f64) -> f64 {
 
 /// A number as printed: six decimals, or an exponent where these show too few digits.
 pub(crate) fn number(value: f64) -> String {
+    let trimmed = |digits: &str| {
+        digits
+            .trim_end_matches('0')
+            .trim_end_matches('.')
+            .to_owned()
+    };
     if value == 0.0 || (1e-3..1e6).contains(&value.abs()) {
-        let text = format!("{value:.6}");
-        text.trim_end_matches('0').trim_end_matches('.').to_owned()
-    } else {
-        format!("{value:.6e}")
+        return trimmed(&format!("{value:.6}"));
+    }
+    let text = format!("{value:.6e}");
+    match text.split_once('e') {
+        Some((digits, power)) => format!("{}e{power}", trimmed(digits)),
+        None => text,
     }
 }
