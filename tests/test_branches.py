@@ -271,9 +271,10 @@ def test_what_is_no_shape_is_no_start(arch, start, words):
 
 
 @pytest.mark.full
-def test_shapes_of_a_closed_band_that_differ_by_sliding_are_one() -> None:
+@pytest.mark.parametrize("elements", [80, None])
+def test_shapes_of_a_closed_band_that_differ_by_sliding_are_one(elements: int | None) -> None:
     """The Möbius band, and the band of three half turns: 135.103 by a boundary value solver of its own."""
-    band = belt([], energy="wunderlich", elements=80)
+    band = belt([], energy="wunderlich", elements=elements)
     band["belt"] |= {"closed": True, "half_turns": 1}
     found = fb.branches(fb.Scenario.from_dict(band))
     assert [shape.half_turns for shape in found] == [1, 3]

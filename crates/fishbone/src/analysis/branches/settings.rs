@@ -128,7 +128,7 @@ impl SearchSettings {
 
     /// Whether two equilibria are the same but for a symmetry, or for sliding along themselves.
     pub(super) fn is_same(&self, a: &Equilibrium, b: &Equilibrium) -> bool {
-        self.is_within(a, b, self.same_level, self.same_distance) || self.is_slid(a, b)
+        self.is_within(a, b, self.same_level, self.same_distance)
     }
 
     /// Whether two equilibria may be the same but for a symmetry and the mesh.
@@ -142,33 +142,25 @@ impl SearchSettings {
         self.is_like(a, b) && (a.energy - b.energy).abs() <= error(a).max(error(b))
     }
 
-    /// Whether two equilibria differ by no more than a share of the energy and a distance in U, and in no number of negative
-    /// modes.
+    /// Whether two equilibria differ by no more than a share of the energy, a distance in U and a symmetry, and in no number
+    /// of negative modes; a belt that may slide along itself is the same wherever it has slid.
     fn is_within(&self, a: &Equilibrium, b: &Equilibrium, share: f64, distance: f64) -> bool {
-        let places: Vec<f64> = (0..PLACES)
-            .map(|k| (k as f64 + 0.5) / PLACES as f64)
-            .collect();
-        let shape = |of: &Solved| sampled(&of.at.point.poses, &of.program.nodes(), &places);
-        self.is_level(a, b, share)
-            && solved(a, b).is_some_and(|[a, b]| are_images(&shape(a), &shape(b), distance))
-    }
-
-    /// Whether two equilibria are the same but for a symmetry and for sliding along themselves.
-    fn is_slid(&self, a: &Equilibrium, b: &Equilibrium) -> bool {
-        let is_slid = |[a, b]: [&Solved; 2]| {
-            let half_turns = a.program.slides()?;
-            let u: Vec<f64> = (0..=PLACES).map(|k| k as f64 / PLACES as f64).collect();
-            let [of_a, of_b] =
-                [a, b].map(|of| sampled(&of.at.point.poses, &of.program.nodes(), &u));
-            Some(are_images_slid(
-                &of_a,
-                &of_b,
-                &u,
-                half_turns,
-                self.same_distance,
-            ))
+        let at =
+            |places: &[f64], of: &Solved| sampled(&of.at.point.poses, &of.program.nodes(), places);
+        let are_images = |[a, b]: [&Solved; 2]| {
+            let middles: Vec<f64> = (0..PLACES)
+                .map(|k| (k as f64 + 0.5) / PLACES as f64)
+                .collect();
+            are_images(&at(&middles, a), &at(&middles, b), distance)
         };
-        self.is_level(a, b, self.same_level) && solved(a, b).and_then(is_slid) == Some(true)
+        let are_slid = |[a, b]: [&Solved; 2]| {
+            a.program.slides().is_some_and(|half_turns| {
+                let u: Vec<f64> = (0..=PLACES).map(|k| k as f64 / PLACES as f64).collect();
+                are_images_slid(&at(&u, a), &at(&u, b), &u, half_turns, distance)
+            })
+        };
+        self.is_level(a, b, share)
+            && solved(a, b).is_some_and(|both| are_images(both) || are_slid(both))
     }
 
     /// Whether two equilibria differ by no more than a share of the energy, and in no number of negative modes.
