@@ -13,7 +13,7 @@ impl Settings {
         /// First barrier parameter, so low that the descent begins near its start; objective per unit weight.
         const FIRST_BARRIER: f64 = 1e-5;
         /// Largest count of iterations; a number.
-        const ITERATIONS: usize = 400;
+        const ITERATIONS: usize = 300;
         /// Longest step in the metric, in the unit of distance.
         const LONGEST_STEP: f64 = 1e-3;
         Self {

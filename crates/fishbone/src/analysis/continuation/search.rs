@@ -5,7 +5,7 @@ use super::trace::{Crossing, Stretch, trace};
 use super::{Branch, CrossingSettings, Diagram, End, Event, Kind, Origin, Snapped, State};
 use crate::analysis::family::{Along, Station};
 use crate::analysis::symmetry::{SAME, are_images};
-use crate::equilibrium::{Equilibrium, of_solution, snapped_from};
+use crate::equilibrium::{Equilibrium, of_solution, snapped_from, solve_near};
 use crate::problem::Mesh;
 use stagewise::{Distance, Events, Family, Pace, Turn};
 use std::ops::ControlFlow;
@@ -401,7 +401,10 @@ impl Search<'_> {
             .continuation(self.pace)
             .descend(from, &event.mode, place, proceed);
         let descended = descended.map(|found| of_solution(&problem, program, found));
-        let others = snapped_from(&problem, &family.mesh, &from.at.point, proceed);
+        let others = match descended {
+            Some(_) => Some(solve_near(&problem, &family.mesh, &from.at.point, proceed)),
+            None => snapped_from(&problem, &family.mesh, &from.at.point, proceed),
+        };
         let distance = |found: &Equilibrium| {
             let solved = found.certified().ok();
             let point = &event.station.at.point;
