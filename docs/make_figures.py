@@ -6,6 +6,7 @@ levels, line styles and markers alone tell things apart; where there are colours
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -274,6 +275,17 @@ def continuation() -> Figure:
     return plot.diagram(fb.follow(fb.Scenario.from_dict(tables), {"loads.points[0].force[1]": -100.0}))
 
 
+def hinge_there_and_back() -> Figure:
+    """The shipped hinge, opened from flat to 130° and closed again, with its snaps."""
+    tables = fb.load(ROOT / "scenarios" / "hinge.toml").to_dict() | {"name": "The hinge, opened and closed"}
+    angles = np.radians([0.0, 130.0, 0.0])
+    poses = [([0.016 * np.sin(a), 0.016 + 0.016 * np.cos(a), 0.034], [0.0, 0.0, -a]) for a in angles]
+    tables["supports"][1] |= dict(zip(("position", "rotation"), poses[0], strict=True))
+    tables["solver"]["elements"] = 200
+    path = fb.Poses(poses[1:], motion="screw")
+    return plot.diagram(fb.follow(fb.Scenario.from_dict(tables), path, snaps=True), radius_limit=0.0105)
+
+
 def shear_diagrams() -> Figure:
     """Height of sheared bands: their equilibria, and the minima of a tracker on the way out and back."""
     figure = Figure(figsize=(WIDTH, 8.6), layout="constrained")
@@ -358,8 +370,13 @@ def locking() -> Figure:
 
 
 def main() -> None:
-    """Writes all pictures."""
+    """Writes all pictures, or those drawn by the functions that the command line names."""
     FIGURES.mkdir(exist_ok=True)
+    if len(sys.argv) > 1:
+        for name in sys.argv[1:]:
+            with mpl.rc_context(STYLE):
+                save(globals()[name](), name)
+        return
     for name in GALLERY:
         with mpl.rc_context(STYLE | {"axes.grid": False, "savefig.dpi": 150.0}):
             save(gallery(name), f"gallery_{name}")
@@ -367,7 +384,8 @@ def main() -> None:
         save(gallery_shapes(), "gallery_shapes")
     with mpl.rc_context(STYLE | {"savefig.dpi": 150.0}):
         save(shear_diagrams(), "shear_diagrams")
-    for draw in (examples, convergence, bound, bend_radius, continuation, shell_thickness, collocation, locking):
+    drawn = (examples, convergence, bound, bend_radius, continuation, hinge_there_and_back)
+    for draw in (*drawn, shell_thickness, collocation, locking):
         with mpl.rc_context(STYLE):
             save(draw(), draw.__name__)
 

@@ -347,6 +347,18 @@ def test_a_saddle_is_followed_back_over_the_fold(turned):
     assert branch.events[0].snapped is None
 
 
+def test_a_belt_that_is_led_snaps_over_and_goes_on(turned):
+    diagram = fb.follow(arch(), {ANGLE: -1.5}, snaps=True)
+    before, after = diagram.branches
+    [fold] = turned.branches[0].events
+    [snap] = before.events
+    assert (before.end, after.end, after.origin) == ("unstable", "range", (0, 0))
+    assert snap.parameter == pytest.approx(fold.parameter, abs=1e-6)
+    assert (snap.confirmed, snap.negative_modes) == (True, (0, 1))
+    assert all(after.stable)
+    assert after.energy[-1] == pytest.approx(fb.solve(after.equilibrium(-1).scenario).energy, rel=1e-6)
+
+
 def test_a_belt_without_supports_is_followed():
     diagram = fb.follow(fb.load(ROOT / "scenarios" / "mobius.toml"), {"belt.width": 0.15}, branches=1)
     assert diagram.branches[0].end == "range"

@@ -105,3 +105,45 @@ def test_a_taut_start_is_refused_in_words_of_the_scenario():
         fb.follow(fb.Scenario.from_dict(tables), {"supports[1].position[1]": 0.9})
     assert caught.value.reason == "taut"
     assert "\n" not in str(caught.value)
+
+
+@pytest.fixture(scope="module")
+def there_and_back() -> fb.Diagram:
+    """The hinge opened from flat to 130° and closed again, as one path."""
+    return fb.follow(hinge(), fb.Poses([pose(130.0), pose(0.0)], motion="screw"), snaps=True)
+
+
+@pytest.mark.full
+def test_the_hinge_goes_there_and_back_as_one_path(there_and_back):
+    branches = there_and_back.branches
+    assert [branch.end for branch in branches] == ["unstable"] * 3 + ["range"]
+    assert [branch.origin and branch.origin.branch for branch in branches] == [None, 0, 1, 2]
+    snaps = [event for branch in branches for event in branch.events if event.snapped is not None]
+    assert all(event.confirmed for event in snaps)
+    places = [float(there_and_back.angle(event.parameter)) for event in snaps]
+    np.testing.assert_allclose(places, [52.6, 2.8, 0.8], atol=0.3)
+    np.testing.assert_allclose([event.jump for event in snaps], [1.76e-3, 0.13e-3, 1.9e-3], rtol=0.08)
+    np.testing.assert_allclose([event.released for event in snaps], [4.6e-6, 1.15e-6, 2.5e-6], rtol=0.06)
+    assert branches[-1].parameter[-1] == pytest.approx(2.0, abs=1e-9)
+    assert branches[-1].energy[-1] == pytest.approx(branches[0].energy[0], rel=1e-6)
+    radius = np.concatenate([branch.least_spine_radius for branch in branches])
+    place = np.concatenate([branch.parameter for branch in branches])
+    assert radius.min() == pytest.approx(10.26e-3, rel=1e-3)
+    assert place[radius.argmin()] == pytest.approx(1.0, abs=0.02)
+    assert {status for branch in branches for status in branch.status} == {"converged"}
+
+
+@pytest.mark.parametrize("elements", [200, None])
+def test_a_tracker_snaps_twice_on_closing(elements):
+    tables = hinge().to_dict()
+    tables["solver"]["elements"] = elements
+    tracker = fb.Tracker(fb.Scenario.from_dict({**tables, "solver": {k: v for k, v in tables["solver"].items() if v}}))
+    tracker.update(*pose(60.0))
+    tracker.update(*pose(130.0))
+    updates = [tracker.update(*pose(angle)) for angle in np.arange(129.0, -0.1, -1.0)]
+    assert {update.status for update in updates} == {"converged"}
+    small, large = [update for update in updates if update.snapped]
+    assert small.jump == pytest.approx(0.125e-3, rel=0.08)
+    assert small.released == pytest.approx(1.15e-6, rel=0.06)
+    assert large.jump == pytest.approx(1.9e-3, rel=0.06)
+    assert large.released == pytest.approx(2.5e-6, rel=0.06)

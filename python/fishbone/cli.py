@@ -246,7 +246,7 @@ def _warn(file: Path, equilibria: list[Equilibrium]) -> None:
 @click.option("--step", type=float, default=0.05, show_default=True, help="Greatest step length along a branch.")
 @click.option("--states", type=int, default=1000, show_default=True, help="Greatest number of states of a branch.")
 @click.option("--branches", type=int, default=10, show_default=True, help="Greatest number of branches.")
-@click.option("--snaps", is_flag=True, help="Follow the minima that the belt snaps to, too.")
+@click.option("--snaps", is_flag=True, help="Lead the belt along its minima, from snap to snap.")
 @click.option("--out", type=_PATH, callback=_output(".json"), help="Write all states: .json.")
 @click.option("--table", type=_PATH, callback=_output(".csv"), help="Write a report on all states: .csv.")
 @click.option(

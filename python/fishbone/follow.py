@@ -126,10 +126,10 @@ class Branch:
         path."""
         self.end: End = inner.end(index)
         """The reason of the end of the branch: the path ends ("range"); the branch meets another branch head on
-        ("event"), or its own start ("closed"); the belt is drawn straight and has no slack left ("taut"); the ribs
-        beside a bend come to other edges, with which no equilibrium is found ("edges"); the `states` of `follow` are
-        used up ("budget"); or no step,
-        however short, converges ("lost")."""
+        ("event"), or its own start ("closed"); the belt loses its stability there and goes on elsewhere ("unstable");
+        the belt is drawn straight and has no slack left ("taut"); the ribs beside a bend come to other edges, with
+        which no equilibrium is found ("edges"); the `states` of `follow` are used up ("budget"); or no step, however
+        short, converges ("lost")."""
         self.events: list[Event] = [_event(*event) for event in inner.events(index)]
         """The events of the branch in order."""
 
@@ -346,11 +346,10 @@ def follow(  # noqa: PLR0913 - keywords all but two
 
     `step` is the greatest length of a step along a branch: the norm of the change of the parameter, which runs from 0
     to 1 or to the number of poses, and of the motion of the belt in U. `states` is the greatest number of states of a
-    branch, `branches` the greatest number of branches. With `snaps` the minima to which the belt snaps at confirmed
-    events are followed too, each as a branch that begins at its event. `progress(branch, share of the path)` is called
-    from the calling thread during the continuation; the share falls where a branch has turned back. Other threads run
-    meanwhile, and
-    Ctrl-C ends the continuation.
+    branch, `branches` the greatest number of branches. With `snaps` the belt is led along its minima alone: a branch
+    ends where the belt snaps, and the next begins at the minimum to which it snaps. `progress(branch, share of the
+    path)` is called from the calling thread during the continuation; the share falls where a branch has turned back.
+    Other threads run meanwhile, and Ctrl-C ends the continuation.
 
     Errors: `NoPath` where the scenario has no such numbers, where nothing changes, and where the scenario at the end
     of the path is invalid; `NoBranch` where the start has not converged or may move at no cost of energy; `NoSupport`;

@@ -77,6 +77,7 @@ fn solved(stiffness: f64) -> stagewise::Solution<BeltPoint<3>> {
         tolerance: 1e-8,
         iterations: 200,
         barrier: 10.0,
+        longest_step: f64::INFINITY,
     };
     stagewise::minimise(&program, &settings, start(&program), &mut || {
         ControlFlow::Continue(())

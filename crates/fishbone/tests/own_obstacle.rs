@@ -56,6 +56,7 @@ fn minimum(program: &BeltProgram, mut start: BeltPoint) -> Solution<BeltPoint> {
         tolerance: 1e-9,
         iterations: 300,
         barrier: 1.0,
+        longest_step: f64::INFINITY,
     };
     stagewise::minimise(program, &settings, start, &mut || ControlFlow::Continue(()))
 }

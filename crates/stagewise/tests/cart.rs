@@ -143,6 +143,7 @@ fn settings() -> Settings {
         tolerance: 1e-9,
         iterations: 100,
         barrier: 1.0,
+        longest_step: f64::INFINITY,
     }
 }
 

@@ -243,6 +243,7 @@ fn settings() -> Settings {
         tolerance: 1e-9,
         iterations: 100,
         barrier: 1.0,
+        longest_step: f64::INFINITY,
     }
 }
 
@@ -339,6 +340,7 @@ fn test_follower_arrives_where_a_solve_does() {
     let settings = FollowSettings {
         tolerance: 1e-9,
         smallest_jump: 1e-3,
+        jumps: true,
     };
     let mut follower = Follower::new(clamped(0.6), settings, &start.at).unwrap();
     let mut change = |rod: &mut Rod, share: f64| {

@@ -29,6 +29,8 @@ named! {
         Event = "event",
         /// The branch has come back to its start.
         Closed = "closed",
+        /// The belt loses its stability, and leaves the branch.
+        Unstable = "unstable",
         /// The allowed number of states is used up.
         Budget = "budget",
         /// No step, however short, leads on.
@@ -99,7 +101,7 @@ pub struct Settings {
     pub states: usize,
     /// Most branches.
     pub branches: usize,
-    /// Whether the branches to which the belt snaps are followed too.
+    /// Whether the belt is led along its minima and from each loss of one to the next minimum, and nowhere else.
     pub snaps: bool,
     /// Search for crossing branches.
     pub crossings: CrossingSettings,
@@ -129,7 +131,7 @@ impl Default for CrossingSettings {
             before: [5e-3, 1e-3, 2e-2, 2e-4],
             beside: [2e-3, 5e-4, 1e-2],
             near: 0.2,
-            past: 1e-4,
+            past: 1e-5,
             on_branch: 2e-3,
             sag: 0.05,
         }

@@ -1,7 +1,8 @@
 //! Tracking: an equilibrium is followed at the rate of a robot while one of its supports moves.
 
 use crate::equilibrium::{
-    Equilibrium, Solved, Status, Uncertified, minimum_next_to_on, of_solution, solve_near,
+    Equilibrium, Solved, Status, Uncertified, minimum_next_to_on, of_solution, snapped_from,
+    solve_near,
 };
 use crate::geometry::{Pose, Wrench, exp};
 use crate::names::named;
@@ -17,7 +18,7 @@ use thiserror::Error;
 const SWITCHES: usize = 40;
 
 /// Distance past the loss of an equilibrium at which the belt is let go downhill, in U and rad.
-const PAST: f64 = 1e-4;
+const PAST: f64 = 1e-5;
 
 /// The reason why an equilibrium cannot be followed.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -96,6 +97,7 @@ impl Tracker {
         let settings = FollowSettings {
             tolerance: problem.tolerance(),
             smallest_jump: problem.snap_size(),
+            jumps: false,
         };
         let follower = Follower::new(solved.program.clone(), settings, &solved.at);
         let follower = follower.ok_or(NoTracker::Marginal)?;
@@ -195,7 +197,6 @@ impl Tracker {
                 continue;
             }
             if self.is_settled() {
-                way.add(followed.jump, followed.released);
                 self.pose = way.pose(ahead);
                 if ahead >= 1.0 {
                     return Status::Converged;
@@ -206,18 +207,6 @@ impl Tracker {
             let beyond = self.follower.point().clone();
             self.return_to_start();
             self.remember_start(way);
-            if followed.jump > 0.0 {
-                // The belt snaps to where other edges hold its ribs.
-                let pose = way.pose(ahead);
-                if !self.snap_to(&beyond, &pose, way, proceed) {
-                    break;
-                }
-                if ahead >= 1.0 {
-                    return Status::Converged;
-                }
-                (done, ahead) = (ahead, 1.0);
-                continue;
-            }
             if !self.switch_to_edges_of(&beyond, way, proceed) {
                 ahead = 0.5 * (done + ahead);
             }
@@ -265,8 +254,8 @@ impl Tracker {
             return false;
         };
         let mesh = Mesh::of(&problem, self.follower.program());
-        let near = minimum_next_to_on(&problem, &mesh, shape, proceed);
-        self.take(&near, way) || self.take(&solve_near(&problem, &mesh, shape, proceed), way)
+        let found = snapped_from(&problem, &mesh, shape, proceed);
+        found.is_some_and(|found| self.take(&found, way))
     }
 
     /// Solves at the end of a way on which the belt could not be followed.
@@ -294,8 +283,9 @@ impl Tracker {
             return false;
         }
         let jump = self.point().distance(&before);
-        if jump > self.problem.snap_size() {
-            way.add(jump, (energy - self.energy()) / self.units().energy);
+        let released = energy - self.energy();
+        if self.problem.is_snap(jump, released, found.elastic_energy) {
+            way.add(jump, released / self.units().energy);
         }
         true
     }

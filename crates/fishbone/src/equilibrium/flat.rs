@@ -209,6 +209,7 @@ mod tests {
             tolerance: 1e-8,
             iterations: 100,
             barrier: 1e-6,
+            longest_step: f64::INFINITY,
         };
         let found = minimise(&program, &settings, flat, &mut || ControlFlow::Continue(()));
         assert_eq!(found.outcome, Outcome::Converged);

@@ -13,7 +13,7 @@ use crate::problem::{Problem, number};
 use crate::scenario::{Scenario, SupportSpec};
 use crate::surface::linking::half_turns;
 use nalgebra::Vector3;
-use stagewise::{Outcome, Solution, Stationary, redundant_equalities};
+use stagewise::{Outcome, Settings, Solution, Stationary, redundant_equalities};
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 use std::sync::OnceLock;
@@ -181,9 +181,10 @@ fn find(
     } = search.settings;
     let uniform = || problem.program(problem.elements());
     let mut program = match from {
-        Start::Near(mesh, _) | Start::Minimum(mesh, _) | Start::Close(mesh, _) => {
-            problem.program_on(mesh).unwrap_or_else(uniform)
-        }
+        Start::Near(mesh, _)
+        | Start::Minimum(mesh, _)
+        | Start::Close(mesh, _)
+        | Start::Downhill(mesh, _) => problem.program_on(mesh).unwrap_or_else(uniform),
         _ => uniform(),
     };
     if !problem.has_fixed_mesh() {
@@ -191,7 +192,7 @@ fn find(
             Start::Guess => Some(None),
             Start::Shape(shape) => Some(Some((&program, shape, cold_barrier))),
             Start::Minimum(_, shape) => Some(Some((&program, shape, close_barrier))),
-            Start::Near(..) | Start::Close(..) => None,
+            Start::Near(..) | Start::Close(..) | Start::Downhill(..) => None,
         };
         if let Some(start) = start {
             return refine(problem, &search, start, proceed).into();
@@ -204,6 +205,13 @@ fn find(
             // Other active sets do not lead away either.
             search.settings.warm_barrier = close_barrier;
             search.only_from(&program, shape.clone(), close_barrier, proceed)
+        }
+        Start::Downhill(_, shape) => {
+            let downhill = Settings::downhill(search.tolerance, 1.0);
+            search.settings.warm_barrier = downhill.barrier;
+            search.settings.iterations = downhill.iterations;
+            search.settings.longest_step = downhill.longest_step;
+            search.only_from(&program, shape.clone(), downhill.barrier, proceed)
         }
         Start::Guess => {
             let default = problem.scenario().default_elements();

@@ -27,7 +27,7 @@ use crate::surface::{HighestPoint, highest_point};
 use accuracy::Estimate;
 use guess::{folded_band, guess, waved};
 use nalgebra::{Vector2, Vector3};
-use stagewise::{Inertia, Multipliers, Residuals, Stationary, Values};
+use stagewise::{Distance, Inertia, Multipliers, Residuals, Stationary, Values};
 use std::ops::ControlFlow;
 use std::sync::OnceLock;
 use thiserror::Error;
@@ -319,6 +319,8 @@ enum Start<'a> {
     Shape(&'a BeltPoint),
     /// On a mesh, at a shape very near to a minimum, and nowhere else.
     Close(&'a Mesh, &'a BeltPoint),
+    /// On a mesh, at a shape from which to go downhill to the nearest minimum, and nowhere else.
+    Downhill(&'a Mesh, &'a BeltPoint),
 }
 
 /// The equilibrium of a problem: found from the guess, or followed from a quarter turn where supports are turned by more than
@@ -419,6 +421,29 @@ pub(crate) fn minimum_next_to(
 ) -> Equilibrium {
     let mesh = Mesh::uniform(problem, problem.elements());
     minimum_next_to_on(problem, &mesh, shape, proceed)
+}
+
+/// The minimum to which a belt snaps from a shape that is no minimum: of those that a descent from the shape and a search near
+/// to it find, the one next to the shape; `None` where neither finds any.
+pub(crate) fn snapped_from(
+    problem: &Problem,
+    mesh: &Mesh,
+    shape: &BeltPoint,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Option<Equilibrium> {
+    let starts = [Start::Downhill(mesh, shape), Start::Near(mesh, shape)];
+    let found = starts.map(|start| intrinsic::solve(problem, start, proceed));
+    let distance = |found: &Equilibrium| {
+        let solved = found.certified().ok();
+        solved.map_or(f64::INFINITY, |solved| solved.at.point.distance(shape))
+    };
+    let is_minimum = |found: &Equilibrium| {
+        let is_unstable =
+            found.stability.and_then(|stability| stability.is_stable()) == Some(false);
+        distance(found).is_finite() && !is_unstable
+    };
+    let minima = found.into_iter().filter(is_minimum);
+    minima.min_by(|a, b| distance(a).total_cmp(&distance(b)))
 }
 
 /// The minimum next to a shape on a mesh, whatever its active sets.

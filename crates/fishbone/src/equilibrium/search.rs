@@ -19,6 +19,8 @@ pub(super) struct MinimumSettings {
     pub(super) warm_barrier: f64,
     /// First barrier from the same minimum on another mesh, in mean R_f/U.
     pub(super) close_barrier: f64,
+    /// Longest step, root mean square of the displacement of the board, in U.
+    pub(super) longest_step: f64,
     /// Greatest count of iterations from one start, a number.
     pub(super) iterations: usize,
     /// Disturbances of a start that leads to no minimum, in turn, as shares of the rib bound.
@@ -36,6 +38,7 @@ impl Default for MinimumSettings {
             cold_barrier: 10.0,
             warm_barrier: 0.1,
             close_barrier: 1e-3,
+            longest_step: f64::INFINITY,
             iterations: 500,
             disturbances: [0.05, 0.2, 0.4],
             slant: 0.7,
@@ -253,6 +256,7 @@ impl Search {
             tolerance: self.tolerance,
             iterations: self.settings.iterations,
             barrier,
+            longest_step: self.settings.longest_step,
         }
     }
 }

@@ -118,6 +118,7 @@ impl Way {
         let settings = FollowSettings {
             tolerance: self.goal.tolerance(),
             smallest_jump: 2e-3,
+            jumps: true,
         };
         let mut follower = Follower::new(solved.program.clone(), settings, &solved.at)?;
         let mut change = |program: &mut BeltProgram, share: f64| {

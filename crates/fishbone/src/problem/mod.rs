@@ -269,6 +269,16 @@ impl Problem {
         self.scenario.solver.snap_size * self.belt.width / self.units.length
     }
 
+    /// Whether a displacement and the energy released in it, of a belt of an elastic energy, are a snap. Where a branch splits
+    /// into two smoothly, the belt goes over to one of them, and the energy released there tends to 0.
+    ///
+    /// Units: U, and any unit of energy
+    pub(crate) fn is_snap(&self, jump: f64, released: f64, elastic_energy: f64) -> bool {
+        /// Least energy released in a snap over the elastic energy, dimensionless.
+        const LEAST_RELEASED: f64 = 1e-4;
+        jump >= self.snap_size() && released >= LEAST_RELEASED * elastic_energy
+    }
+
     /// Whether the scenario names the number of elements.
     pub(crate) fn has_fixed_mesh(&self) -> bool {
         self.scenario.solver.elements.is_some()

@@ -28,6 +28,9 @@ pub struct Settings {
     pub iterations: usize,
     /// First barrier parameter, an objective per unit weight.
     pub barrier: f64,
+    /// Longest step in the metric of the programme. Short steps lead to the nearest minimum downhill, infinite ones to a
+    /// minimum in few iterations.
+    pub longest_step: f64,
 }
 
 /// Why the minimisation ended.
@@ -127,6 +130,7 @@ pub fn assess<P: Program<X, U, N>, const X: usize, const U: usize, const N: usiz
         tolerance,
         iterations: 0,
         barrier: 0.0,
+        longest_step: f64::INFINITY,
     };
     let mut interior_point = InteriorPoint::new(program, settings, at.point.clone());
     let iterate = &mut interior_point.iterate;
@@ -158,6 +162,10 @@ struct InteriorPoint<'a, P: Program<X, U, N>, const X: usize, const U: usize, co
     iteration: usize,
     admissible: bool,
     interrupted: bool,
+    /// Whether the last step was under drag, so that no residual need fall.
+    is_creeping: bool,
+    /// Drag of the last step.
+    drag: f64,
     progress: Progress,
 }
 
@@ -208,6 +216,8 @@ impl<'a, P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>
             iteration: 0,
             admissible,
             interrupted: false,
+            is_creeping: false,
+            drag: 0.0,
             progress: Progress::NONE,
         }
     }
@@ -238,7 +248,7 @@ impl<'a, P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>
                 self.progress = Progress::NONE;
             }
             let is_least = self.iterate.is_barrier_least(self.settings.tolerance);
-            if is_least && !self.progress.goes_on(residuals.largest()) {
+            if is_least && !self.is_creeping && !self.progress.goes_on(residuals.largest()) {
                 return Outcome::Stalled;
             }
             self.iterate.assemble();
@@ -262,7 +272,40 @@ impl<'a, P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>
     /// Goes along the Newton step as far as the filter accepts; false where no length is accepted.
     fn descends(&mut self) -> bool {
         self.iterate.find_rigid_step();
+        self.is_creeping = self.drag_step();
         self.search()
+    }
+
+    /// Adds drag, a multiple of the metric, to the second derivative until it is convex and the step no longer than the longest
+    /// step; gives whether drag was needed.
+    fn drag_step(&mut self) -> bool {
+        /// First drag, and the drag beyond which a step is taken as it is; second derivative in the metric.
+        const DRAGS: [f64; 2] = [1.0, 1e9];
+        /// Least ratio of successive drags; dimensionless.
+        const STRONGER: f64 = 2.0;
+        /// Ratio of the last drag to the first that is tried after it; dimensionless.
+        const WEAKER: f64 = 4.0;
+        let longest = self.settings.longest_step;
+        if longest.is_infinite() {
+            return false;
+        }
+        let iterate = &mut self.iterate;
+        let metric = iterate.program.metric(&iterate.point);
+        let (mut drag, known) = (0.0, self.drag / WEAKER);
+        loop {
+            let excess = iterate.kkt.step_length(&metric) / longest;
+            if drag > DRAGS[1] || (excess <= 1.0 && !iterate.kkt.is_damped()) {
+                self.drag = drag;
+                return drag > 0.0;
+            }
+            let more = (drag * excess.max(STRONGER)).max(DRAGS[0]).max(known);
+            iterate.kkt.shift(&metric, drag - more);
+            drag = more;
+            if iterate.kkt.factorise(UNBOUNDED).is_err() {
+                return true;
+            }
+            iterate.find_rigid_step();
+        }
     }
 
     /// Whether the caller has interrupted, now or before.

@@ -48,7 +48,10 @@ pub(crate) struct Kkt<const X: usize, const U: usize, const N: usize> {
     /// The border of the exact factorisation: all equalities, then the other rows of pairs.
     exact: Option<Border<N>>,
     node_weights: Vec<f64>,
+    /// Damping that the last concave second derivative took.
     damping: f64,
+    /// Damping of the present factorisation.
+    factor_damping: f64,
     right: Vec<NodeVector<N>>,
     /// Force of the springs, nonzero at the nodes of equalities only.
     pulls: Vec<NodeVector<N>>,
@@ -83,6 +86,7 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
             factor: Factor::new(layout.stages()),
             node_weights: layout.node_weights(),
             damping: 0.0,
+            factor_damping: 0.0,
             right: zeros.clone(),
             pulls: zeros.clone(),
             correction: zeros.clone(),
@@ -240,11 +244,25 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         Err(TooConcave)
     }
 
+    /// Whether the present factorisation is damped.
+    pub(crate) fn is_damped(&self) -> bool {
+        self.factor_damping > 0.0
+    }
+
+    /// Length of the step in a metric.
+    pub(crate) fn step_length(&self, metric: &[SMatrix<f64, X, X>]) -> f64 {
+        let states = self.step.iter().map(|node| node.fixed_rows::<X>(0));
+        let squares = states.zip(metric);
+        let squares = squares.map(|(state, metric)| state.dot(&(metric * state)));
+        squares.sum::<f64>().sqrt()
+    }
+
     /// Factorises with a given damping of the controls per unit weight.
     ///
     /// Errors: [`TooConcave`] where the second derivative is not positive on the tangent space of the equalities.
     pub(crate) fn factorise_damped(&mut self, damping: f64) -> Result<(), TooConcave> {
         self.exact = None;
+        self.factor_damping = damping;
         let (chain, factor) = (&self.linear.chain, &mut self.factor);
         let most = self.border.rows.len();
         let concave = chain.factorise(&self.diagonal, damping, &self.node_weights, most, factor)?;

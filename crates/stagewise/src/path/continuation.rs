@@ -7,8 +7,9 @@
 //! Source of the method: H. B. Keller, "Numerical solution of bifurcation and nonlinear eigenvalue problems" (1977).
 
 use super::curve::{Curve, End, Event, Events, Pace, Station, Turn};
+use super::descent::descend;
 use super::family::{Alone, Family};
-use crate::interior_point::{Settings, Solution, assess, minimise};
+use crate::interior_point::{Solution, assess};
 use crate::linear::modes::dot;
 use crate::linear::{Mode, Response, lowest_modes, moved};
 use crate::program::{Distance, Program, Stationary, Values};
@@ -183,25 +184,16 @@ impl<'a, F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
         parameter: f64,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Option<Solution<F::Point>> {
-        /// Barrier parameter with which a descent begins, low enough to stay near the start; objective per unit weight.
-        const FIRST_BARRIER: f64 = 1e-5;
-        /// Largest count of interior-point iterations of a descent; a number.
-        const ITERATIONS: usize = 300;
         /// Perturbation off a saddle along a mode; in [`Scales::distance`](crate::Scales::distance).
         const PERTURBATION: f64 = 1e-3;
-        let settings = Settings {
-            tolerance: self.tolerance,
-            iterations: ITERATIONS,
-            barrier: FIRST_BARRIER,
-        };
         let program = self.family.at(parameter)?;
-        let mut found = minimise(&program, &settings, from.at.point.clone(), proceed);
+        let mut found = descend(&program, self.tolerance, from.at.point.clone(), proceed);
         for off in [PERTURBATION, -PERTURBATION, 10.0 * PERTURBATION] {
             if found.is_minimum() {
                 break;
             }
             let off = moved(&program, &from.at.point, mode, off * self.unit);
-            found = minimise(&program, &settings, off, proceed);
+            found = descend(&program, self.tolerance, off, proceed);
         }
         found.is_minimum().then_some(found)
     }

@@ -42,6 +42,8 @@ pub struct FollowSettings {
     pub tolerance: f64,
     /// Distance between minima up to which a descent is no jump, in the unit of [`Distance`].
     pub smallest_jump: f64,
+    /// Whether the follower jumps; if not, a way ends before its first jump.
+    pub jumps: bool,
 }
 
 /// Progress on a way of length 1.
@@ -182,6 +184,7 @@ where
             tolerance: self.settings.tolerance,
             iterations: ITERATIONS,
             barrier: FIRST_BARRIER,
+            longest_step: f64::INFINITY,
         };
         // The iterate is at the lost minimum; the little that the programme has changed since is left out.
         let before = self.iterate.values.objective;
@@ -198,6 +201,9 @@ where
         let moved = length * (next - way.done);
         let jump = found.at.point.distance(&self.last.point);
         if jump > SMOOTH * moved + self.settings.smallest_jump {
+            if !self.settings.jumps {
+                return false;
+            }
             way.jump = way.jump.max(jump);
             way.released += before - found.values.objective;
         }

@@ -5,6 +5,7 @@ mod continuation;
 mod corner;
 mod corrector;
 mod curve;
+mod descent;
 mod event;
 mod family;
 mod follow;

@@ -20,6 +20,7 @@ pub(crate) const SETTINGS: Settings = Settings {
     tolerance: 1e-9,
     iterations: 300,
     barrier: 0.1,
+    longest_step: f64::INFINITY,
 };
 
 /// The minimum from a start, which must be found.

@@ -5,9 +5,9 @@ use super::trace::{Crossing, Stretch, trace};
 use super::{Branch, CrossingSettings, Diagram, End, Event, Kind, Origin, Snapped, State};
 use crate::analysis::family::{Along, Station};
 use crate::analysis::symmetry::{SAME, are_images};
-use crate::equilibrium::{Status, minimum_next_to_on, of_solution, solve_near};
+use crate::equilibrium::{Equilibrium, of_solution, snapped_from, solve_near};
 use crate::problem::Mesh;
-use stagewise::{Distance, Family, Pace, Turn};
+use stagewise::{Distance, Events, Family, Pace, Turn};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -24,7 +24,12 @@ pub(super) fn run(
         proceed,
         diagram,
     };
-    search.trace(None, family, start);
+    match search.diagram.settings.snaps {
+        true => search.lead(family, start),
+        false => {
+            search.trace(None, family, start);
+        }
+    }
     search.diagram
 }
 
@@ -88,29 +93,18 @@ impl Search<'_> {
         event: &Crossing,
         stretch: &Stretch,
     ) {
-        let crossing = self.crossing(event, &stretch.stations[..state], &stretch.family);
-        let before = state.checked_sub(1).map(|before| &stretch.stations[before]);
-        let is_loss = event.negative[0] == 0 && event.negative[1] > 0;
-        let snapped = is_loss
-            .then(|| self.snapped(event, &crossing, before, &stretch.family))
-            .flatten();
-        let pace = self.pace;
-        let ask = &mut |station: &Station| (self.proceed)(branch, station.parameter);
-        let confirmed = is_confirmed(stretch, state, event, pace, ask);
-        let events = &mut self.diagram.branches[branch].events;
+        let found = self.found_at(branch, state, event, stretch, None);
         let origin = Origin {
             branch,
-            event: events.len(),
+            event: self.diagram.branches[branch].events.len(),
         };
-        events.push(Event {
-            kind: kind(event, &crossing),
-            state: first + state,
-            place: event.parameter,
-            negative_modes: event.negative,
-            confirmed,
-            snapped,
-        });
-        let landed = self.landed(branch, origin.event, stretch);
+        let is_snap = self.add_found(branch, first + state, event, &found);
+        let Found {
+            crossing, landed, ..
+        } = found;
+        // The belt passes over a fold that is smaller than a snap.
+        let landed = landed.filter(|_| event.turn == Turn::Fold && !is_snap);
+        let landed = landed.and_then(|landed| self.start_at(&landed, event, stretch));
         if let Some((family, start)) = landed.filter(|(_, start)| self.may_follow(start)) {
             self.trace(Some(origin), &family, start);
         }
@@ -130,17 +124,152 @@ impl Search<'_> {
         }
     }
 
-    /// The start of the branch to which the belt snaps at an event, in the direction in which it was led.
-    fn landed(&self, branch: usize, event: usize, stretch: &Stretch) -> Option<(Along, Station)> {
-        let event = &self.diagram.branches[branch].events[event];
-        let is_wanted = self.diagram.settings.snaps && event.confirmed;
-        let snapped = event.snapped.as_ref().filter(|_| is_wanted)?;
-        let solved = snapped.equilibrium.certified().ok()?;
-        let mesh = Mesh::of(snapped.equilibrium.problem(), &solved.program);
+    /// Leads the belt along the path: its minima, and where one is lost the minimum to which the belt goes on. A branch ends
+    /// where the belt snaps.
+    fn lead(&mut self, family: &Along, start: Station) {
+        let (mut family, mut start) = (family.clone(), start);
+        let mut origin = None;
+        while self.diagram.branches.len() < self.diagram.settings.branches {
+            let index = self.diagram.branches.len();
+            self.diagram.branches.push(Branch {
+                origin,
+                states: Vec::new(),
+                events: Vec::new(),
+                end: End::Budget,
+            });
+            let Some(next) = self.lead_to_snap(index, family, start) else {
+                return;
+            };
+            (family, start) = next;
+            let event = self.diagram.branches[index].events.len() - 1;
+            origin = Some(Origin {
+                branch: index,
+                event,
+            });
+        }
+    }
+
+    /// Leads the belt along a branch to its end; gives the start beyond if it ends with a snap.
+    fn lead_to_snap(
+        &mut self,
+        index: usize,
+        mut family: Along,
+        mut start: Station,
+    ) -> Option<(Along, Station)> {
+        /// Ratio of successive distances past an event that the branch comes back to, dimensionless.
+        const FARTHER: f64 = 10.0;
+        let (mut past, mut landing) = (self.diagram.settings.crossings.past, None);
+        loop {
+            let first = self.diagram.branches[index].states.len();
+            let pace = Pace {
+                stations: self.pace.stations.saturating_sub(first),
+                events: Events::EndAtFirst,
+                ..self.pace
+            };
+            if pace.stations < 2 {
+                return None;
+            }
+            let proceed = &mut |station: &Station| (self.proceed)(index, station.parameter);
+            let (stretches, end) = trace(&family, start, pace, proceed);
+            let mut state = first;
+            for (place, stretch) in stretches.iter().enumerate() {
+                let branch = &mut self.diagram.branches[index];
+                branch.states.extend(states(stretch));
+                branch.end = End::from(end);
+                if place > 0 {
+                    self.add_switch(index, state, stretch);
+                }
+                state += stretch.stations.len();
+            }
+            let last = stretches.last()?;
+            let (event_state, event) = last.events.last()?;
+            let is_same = landing.is_some_and(|place| event.parameter <= place + past);
+            past = match is_same {
+                true => FARTHER * past,
+                false => self.diagram.settings.crossings.past,
+            };
+            landing = Some(event.parameter + past);
+            self.diagram.branches[index].end = End::Unstable;
+            if is_same {
+                let before = &last.stations[event_state.checked_sub(1)?];
+                let landed = self.landed(event, &[], Some(before), past, &last.family)?;
+                (family, start) = self.start_at(&landed, event, last)?;
+                continue;
+            }
+            let found = self.found_at(index, *event_state, event, last, Some(past));
+            let at = state - last.stations.len() + event_state;
+            let is_snap = self.add_found(index, at, event, &found);
+            let next = self.start_at(&found.landed?, event, last)?;
+            if is_snap {
+                return Some(next);
+            }
+            (family, start) = next;
+        }
+    }
+
+    /// What is found at an event of a stretch. A belt that is led goes on by a distance past any event, forward on the path;
+    /// else it goes on where a branch loses its stability, in the direction of the branch.
+    fn found_at(
+        &mut self,
+        branch: usize,
+        state: usize,
+        event: &Crossing,
+        stretch: &Stretch,
+        led: Option<f64>,
+    ) -> Found {
+        let crossing = self.crossing(event, &stretch.stations[..state], &stretch.family);
+        let before = state.checked_sub(1).map(|before| &stretch.stations[before]);
+        let is_loss = event.negative[0] == 0 && event.negative[1] > 0;
+        let past = led.unwrap_or_else(|| {
+            let onwards = before.map_or(1.0, |before| event.parameter - before.parameter);
+            self.diagram.settings.crossings.past * onwards.signum()
+        });
+        let landed = (is_loss || led.is_some())
+            .then(|| self.landed(event, &crossing, before, past, &stretch.family))
+            .flatten();
+        let pace = self.pace;
+        let ask = &mut |station: &Station| (self.proceed)(branch, station.parameter);
+        let confirmed = is_confirmed(stretch, state, event, pace, ask);
+        Found {
+            crossing,
+            landed,
+            confirmed,
+        }
+    }
+
+    /// Adds an event at a state of a branch; gives whether the belt snaps there.
+    fn add_found(&mut self, branch: usize, state: usize, event: &Crossing, found: &Found) -> bool {
+        let is_snap = |landed: &&Snapped| {
+            let (to, jump) = (&landed.equilibrium, landed.jump);
+            let jump = jump / to.problem().units().length;
+            to.problem()
+                .is_snap(jump, landed.released, to.elastic_energy)
+        };
+        let snapped = found.landed.as_ref().filter(is_snap);
+        self.diagram.branches[branch].events.push(Event {
+            kind: kind(event, &found.crossing),
+            state,
+            place: event.parameter,
+            negative_modes: event.negative,
+            confirmed: found.confirmed,
+            snapped: snapped.cloned(),
+        });
+        snapped.is_some()
+    }
+
+    /// The start of the branch on which the belt goes on past an event, in the direction in which it was led.
+    fn start_at(
+        &self,
+        landed: &Snapped,
+        event: &Crossing,
+        stretch: &Stretch,
+    ) -> Option<(Along, Station)> {
+        let solved = landed.equilibrium.certified().ok()?;
+        let mesh = Mesh::of(landed.equilibrium.problem(), &solved.program);
         let family = stretch.family.on(mesh);
         let continuation = family.continuation(self.pace);
-        let rising = snapped.place > event.place;
-        let start = continuation.start(&solved.at, snapped.place, rising)?;
+        let rising = landed.place > event.parameter;
+        let start = continuation.start(&solved.at, landed.place, rising)?;
         Some((family, start))
     }
 
@@ -252,57 +381,61 @@ impl Search<'_> {
         different
     }
 
-    /// The minimum to which a belt led on past an event snaps.
-    fn snapped(
+    /// The minimum to which a belt led on past an event goes.
+    fn landed(
         &mut self,
         event: &Crossing,
         crossing: &[Station],
         before: Option<&Station>,
+        past: f64,
         family: &Along,
     ) -> Option<Snapped> {
-        let onwards = before.map_or(1.0, |before| event.parameter - before.parameter);
-        let past = self.diagram.settings.crossings.past * onwards.signum();
         let place = event.parameter + past;
         let beyond = |station: &&Station| {
-            station.negative == 0 && (station.parameter - event.parameter) * onwards > 0.0
+            station.negative == 0 && (station.parameter - event.parameter) * past > 0.0
         };
         let from = crossing.iter().find(beyond).unwrap_or(&event.station);
         let proceed = &mut || (self.proceed)(0, place);
         let (problem, program) = family.meshed(place)?;
-        let found = family
+        let descended = family
             .continuation(self.pace)
             .descend(from, &event.mode, place, proceed);
-        let here = match found {
-            Some(found) => of_solution(&problem, program, found),
-            None => minimum_next_to_on(&problem, &family.mesh, &from.at.point, proceed),
+        let descended = descended.map(|found| of_solution(&problem, program, found));
+        let others = match descended {
+            Some(_) => Some(solve_near(&problem, &family.mesh, &from.at.point, proceed)),
+            None => snapped_from(&problem, &family.mesh, &from.at.point, proceed),
         };
-        let equilibrium = match here.status {
-            Status::Converged => here,
-            // There, other edges may hold the ribs.
-            _ => {
-                let shape = &here.solved.as_ref()?.at.point;
-                let near = minimum_next_to_on(&problem, &family.mesh, shape, proceed);
-                match near.status {
-                    Status::Converged => near,
-                    _ => solve_near(&problem, &family.mesh, shape, proceed),
-                }
-            }
+        let distance = |found: &Equilibrium| {
+            let solved = found.certified().ok();
+            let point = &event.station.at.point;
+            solved.map_or(f64::INFINITY, |solved| solved.at.point.distance(point))
         };
+        let found = descended.into_iter().chain(others);
+        let equilibrium = found.min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
         let solved = equilibrium.certified().ok()?;
         let objective = solved.values.objective;
         let rate = before.map_or(0.0, |before| {
-            (event.station.objective - before.objective) / onwards
+            (event.station.objective - before.objective) / (event.parameter - before.parameter)
         });
         let led = event.station.objective + rate * past;
         let units = problem.units();
-        let jump = solved.at.point.distance(&event.station.at.point);
-        (jump >= problem.snap_size()).then(|| Snapped {
+        Some(Snapped {
             place,
-            jump: jump * units.length,
+            jump: distance(&equilibrium) * units.length,
             released: (led - objective) * units.energy,
             equilibrium,
         })
     }
+}
+
+/// What is found at an event.
+struct Found {
+    /// Stations of the branches that cross there.
+    crossing: Vec<Station>,
+    /// The minimum on which the belt goes on where it loses its stability.
+    landed: Option<Snapped>,
+    /// Whether a finer mesh has the event.
+    confirmed: bool,
 }
 
 /// The states of a stretch.
