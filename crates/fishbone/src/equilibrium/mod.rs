@@ -372,6 +372,27 @@ pub(crate) fn solve_near(
     intrinsic::solve(problem, Start::Near(mesh, shape), proceed)
 }
 
+/// The minimum that a search finds from a shape of a programme, and nowhere else, on a mesh graded anew for this shape and its
+/// error; `None` where the scenario fixes the mesh, of a belt that is not slender, and where there is no minimum.
+pub(crate) fn slender_minimum_near(
+    problem: &Problem,
+    program: &BeltProgram,
+    shape: &BeltPoint,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Option<Equilibrium> {
+    if problem.has_fixed_mesh() || !refinement::is_slender(problem) {
+        return None;
+    }
+    let mesh = refinement::mesh_about_ribs(problem, program, shape);
+    let graded = problem.program_on(&mesh)?;
+    let shape = search::prolong(program, shape, &graded);
+    Some(intrinsic::solve(
+        problem,
+        Start::Minimum(&mesh, &shape),
+        proceed,
+    ))
+}
+
 /// The minimum that a search finds from a shape on the uniform mesh of the problem's number of elements, and from nowhere
 /// else.
 pub(crate) fn minimum_from(
