@@ -1,8 +1,8 @@
 //! Tracking: an equilibrium is followed at the rate of a robot while one of its supports moves.
 
 use crate::equilibrium::{
-    Equilibrium, Solved, Status, Uncertified, minimum_next_to_on, of_solution,
-    slender_minimum_near, solve_near,
+    Equilibrium, Solved, Status, Uncertified, is_slender_on_graded_mesh, minimum_next_to_on,
+    of_solution, slender_minimum_near, solve_near,
 };
 use crate::geometry::{Pose, Wrench, exp, log};
 use crate::names::named;
@@ -73,6 +73,8 @@ pub struct Tracker {
     problem: Problem,
     support: usize,
     follower: Follower<BeltProgram, 6, 2, 8>,
+    /// Whether the mesh is graded anew on the way.
+    is_slender: bool,
     /// Present pose of the support, in the units of the programme.
     pose: Pose,
     /// Difference between the scenario's potential and the programme's, for their origins.
@@ -105,6 +107,7 @@ impl Tracker {
         let stored = program.elastic_energy(&point.fields) + program.load_potential(&point.poses);
         Ok(Self {
             support,
+            is_slender: is_slender_on_graded_mesh(&problem),
             pose: Pose {
                 frame,
                 position: (position - origin) / units.length,
@@ -172,7 +175,9 @@ impl Tracker {
         let support = self.support;
         let (mut done, mut ahead) = (0.0, 1.0);
         for _ in 0..SWITCHES {
-            if let Some(reached) = self.go_on_anew_graded(done, way, proceed) {
+            if self.is_slender
+                && let Some(reached) = self.go_on_anew_graded(done, way, proceed)
+            {
                 done = reached;
                 if done >= 1.0 {
                     return Status::Converged;

@@ -372,17 +372,19 @@ pub(crate) fn solve_near(
     intrinsic::solve(problem, Start::Near(mesh, shape), proceed)
 }
 
-/// The minimum that a search finds from a shape of a programme, and nowhere else, on a mesh graded anew for this shape and its
-/// error; `None` where the scenario fixes the mesh, of a belt that is not slender, and where there is no minimum.
+/// Whether a problem is that of a slender belt on a mesh that follows the error.
+pub(crate) fn is_slender_on_graded_mesh(problem: &Problem) -> bool {
+    !problem.has_fixed_mesh() && refinement::is_slender(problem)
+}
+
+/// The minimum that a search finds from a shape of a slender belt's programme, and nowhere else, on a mesh graded anew for this
+/// shape and its error; `None` of a programme of another belt.
 pub(crate) fn slender_minimum_near(
     problem: &Problem,
     program: &BeltProgram,
     shape: &BeltPoint,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Option<Equilibrium> {
-    if problem.has_fixed_mesh() || !refinement::is_slender(problem) {
-        return None;
-    }
     let mesh = refinement::mesh_about_ribs(problem, program, shape);
     let graded = problem.program_on(&mesh)?;
     let shape = search::prolong(program, shape, &graded);
