@@ -73,8 +73,8 @@ class Tracker:
 
     @property
     def u(self) -> Floats:
-        """Arc length at the nodes, shape (n,)."""
-        return self._start.u
+        """Arc length at the nodes, shape (n,); an update of a slender belt may change the mesh."""
+        return self._inner.u
 
     @property
     def position(self) -> Floats:

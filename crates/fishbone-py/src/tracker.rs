@@ -77,6 +77,12 @@ impl Tracker {
         self.lock().energy()
     }
 
+    /// Shapes: (n,).
+    #[getter]
+    fn u<'py>(&self, py: Python<'py>) -> Scalars<'py> {
+        self.lock().nodes().into_pyarray(py)
+    }
+
     /// Shapes: (n, 3).
     #[getter]
     fn position<'py>(&self, py: Python<'py>) -> Points<'py> {

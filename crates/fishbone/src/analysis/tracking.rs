@@ -1,10 +1,10 @@
 //! Tracking: an equilibrium is followed at the rate of a robot while one of its supports moves.
 
 use crate::equilibrium::{
-    Equilibrium, Solved, Status, Uncertified, minimum_next_to_on, of_solution, snapped_from,
-    solve_near,
+    Equilibrium, Solved, Status, Uncertified, is_slender_on_graded_mesh, minimum_next_to_on,
+    of_solution, slender_minimum_near, snapped_from, solve_near,
 };
-use crate::geometry::{Pose, Wrench, exp};
+use crate::geometry::{Pose, Wrench, exp, log};
 use crate::names::named;
 use crate::problem::program::{BeltPoint, BeltProgram};
 use crate::problem::{Mesh, Problem, Units};
@@ -73,6 +73,8 @@ pub struct Tracker {
     problem: Problem,
     support: usize,
     follower: Follower<BeltProgram, 6, 2, 8>,
+    /// Whether the mesh is graded anew on the way.
+    is_slender: bool,
     /// Present pose of the support, in the units of the programme.
     pose: Pose,
     /// Difference between the scenario's potential and the programme's, for their origins.
@@ -106,6 +108,7 @@ impl Tracker {
         let stored = program.elastic_energy(&point.fields) + program.load_potential(&point.poses);
         Ok(Self {
             support,
+            is_slender: is_slender_on_graded_mesh(&problem),
             pose: Pose {
                 frame,
                 position: (position - origin) / units.length,
@@ -118,7 +121,8 @@ impl Tracker {
 
     /// Moves the support to a position and a rotation vector, world axes, and the belt with it.
     ///
-    /// Nothing is allocated where the equilibrium is followed and the board has neither links nor bends. `proceed` is asked
+    /// Nothing is allocated where the equilibrium is followed on its mesh and the board has neither links nor bends. The mesh of
+    /// a slender belt is graded anew, unless the scenario fixes it. `proceed` is asked
     /// during the motion whether to go on; `Break` leaves the tracker at its last pose.
     ///
     /// # Errors
@@ -172,6 +176,14 @@ impl Tracker {
         let support = self.support;
         let (mut done, mut ahead) = (0.0, 1.0);
         for _ in 0..SWITCHES {
+            if self.is_slender
+                && let Some(reached) = self.go_on_anew_graded(done, way, proceed)
+            {
+                done = reached;
+                if done >= 1.0 {
+                    return Status::Converged;
+                }
+            }
             let mut change = |program: &mut BeltProgram, share: f64| {
                 program.move_support(support, &way.pose(done + share * (ahead - done)));
             };
@@ -212,6 +224,67 @@ impl Tracker {
             }
         }
         self.solve_at(way, proceed)
+    }
+
+    /// Leads a slender belt on from a share of a way by a search on a mesh graded anew: on nodes that stay, each place where its
+    /// ribs turn passes from element to element, which takes many steps. Gives the share of the way that is reached; `None`
+    /// where the search finds no minimum that is surely of the same branch.
+    fn go_on_anew_graded(
+        &mut self,
+        done: f64,
+        way: &mut Way,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Option<f64> {
+        /// Parts of the way that are tried in turn, as shares of what is left.
+        const PARTS: [f64; 3] = [1.0, 0.5, 0.25];
+        for part in PARTS {
+            let ahead = if part < 1.0 {
+                done + part * (1.0 - done)
+            } else {
+                1.0
+            };
+            let problem = self.problem_at(&way.pose(ahead)).ok()?;
+            let (program, from) = (self.follower.program(), self.follower.point());
+            let found = slender_minimum_near(&problem, program, from, proceed)?;
+            way.iterations += found.iterations;
+            self.remember_start(way);
+            if self.is_smooth_way(&found, [done, ahead], way) && self.restart(&found) {
+                self.pose = way.pose(ahead);
+                return Some(ahead);
+            }
+        }
+        None
+    }
+
+    /// Whether a minimum at the end of a part of a way, given by its shares, is of the present branch: its energy differs from
+    /// the present one by the work of the support. A snap releases energy.
+    fn is_smooth_way(&self, found: &Equilibrium, [done, ahead]: [f64; 2], way: &Way) -> bool {
+        /// Energy released over the work of force and moment, each without its sign, up to which the way is smooth; dimensionless.
+        const RELEASED: f64 = 0.01;
+        if found.status != Status::Converged {
+            return false;
+        }
+        let [start, end] = [done, ahead].map(|share| self.in_scenario(&way.pose(share)));
+        let moved = end.position - start.position;
+        let turned = log(&(end.frame * start.frame.transpose()));
+        let wrenches = [
+            self.reaction(self.support),
+            found.reactions[self.support].wrench,
+        ];
+        // By the trapezoidal rule, off by the third power of the way.
+        let [work, most] = [0, 1].map(|i| {
+            let of_wrench = |wrench: &Wrench| {
+                let (force, moment) = (&wrench.force, &wrench.moment);
+                match i {
+                    0 => force.dot(&moved) + moment.dot(&turned),
+                    _ => force.norm() * moved.norm() + moment.norm() * turned.norm(),
+                }
+            };
+            0.5 * wrenches.iter().map(of_wrench).sum::<f64>()
+        });
+        let released = self.energy() + work - found.energy;
+        let by_meshes = self.problem.accuracy() * found.elastic_energy;
+        released.abs() <= RELEASED * (most + by_meshes)
     }
 
     fn remember_start(&mut self, way: &mut Way) {
@@ -352,6 +425,12 @@ impl Tracker {
     pub fn positions(&self) -> impl Iterator<Item = Vector3<f64>> {
         let poses = self.point().poses.iter();
         poses.map(|pose| self.problem.origin() + pose.position * self.units().length)
+    }
+
+    /// Arc lengths of the nodes.
+    pub fn nodes(&self) -> Vec<f64> {
+        let nodes = self.follower.program().nodes();
+        nodes.iter().map(|u| u * self.units().length).collect()
     }
 
     /// Frames of the nodes.

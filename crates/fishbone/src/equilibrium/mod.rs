@@ -403,6 +403,29 @@ pub(crate) fn solve_near(
     intrinsic::solve(problem, Start::Near(mesh, shape), proceed)
 }
 
+/// Whether a problem is that of a slender belt on a mesh that follows the error.
+pub(crate) fn is_slender_on_graded_mesh(problem: &Problem) -> bool {
+    !problem.has_fixed_mesh() && refinement::is_slender(problem)
+}
+
+/// The minimum that a search finds from a shape of a slender belt's programme, and nowhere else, on a mesh graded anew for this
+/// shape and its error; `None` of a programme of another belt.
+pub(crate) fn slender_minimum_near(
+    problem: &Problem,
+    program: &BeltProgram,
+    shape: &BeltPoint,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Option<Equilibrium> {
+    let mesh = refinement::mesh_about_ribs(problem, program, shape);
+    let graded = problem.program_on(&mesh)?;
+    let shape = search::prolong(program, shape, &graded);
+    Some(intrinsic::solve(
+        problem,
+        Start::Minimum(&mesh, &shape),
+        proceed,
+    ))
+}
+
 /// The minimum that a search finds from a shape on the uniform mesh of the problem's number of elements, and from nowhere
 /// else.
 pub(crate) fn minimum_from(

@@ -212,6 +212,46 @@ fn first_width(problem: &Problem) -> f64 {
     (WIDE.min(SHARE * least) / width(problem)).max(1.0)
 }
 
+/// Whether a belt is so slender that its ribs turn within a small part of its length.
+pub(super) fn is_slender(problem: &Problem) -> bool {
+    first_width(problem) > 1.0
+}
+
+/// The mesh of a programme graded anew for a shape of its: fine where ribs turn, and so far about these places that they may
+/// move by as much as the width.
+pub(super) fn mesh_about_ribs(problem: &Problem, program: &BeltProgram, point: &BeltPoint) -> Mesh {
+    let width = width(problem);
+    mesh_for_ribs(problem, program, point, width / PER_WIDTH, width)
+}
+
+/// A mesh whose elements are short where the ribs of a shape turn and within a reach of there, in U.
+fn mesh_for_ribs(
+    problem: &Problem,
+    program: &BeltProgram,
+    point: &BeltPoint,
+    short: f64,
+    reach: f64,
+) -> Mesh {
+    let nodes = program.nodes();
+    let turning = program.elements();
+    let turning = turning.filter(|element| ribs_turn(point, *element));
+    let turning: Vec<_> = turning.map(|(k, _)| [nodes[k], nodes[k + 1]]).collect();
+    let is_near = |k: usize| {
+        let mut turning = turning.iter();
+        turning.any(|[from, to]| from - nodes[k + 1] < reach && nodes[k] - to < reach)
+    };
+    let elements = program.elements();
+    let lengths: Vec<f64> = elements
+        .map(
+            |(k, element)| match ribs_turn(point, (k, element)) || is_near(k) {
+                true => element.length.min(short),
+                false => element.length.max(LONGEST),
+            },
+        )
+        .collect();
+    Mesh::of(problem, program).graded(problem, &lengths, &[])
+}
+
 /// The width of a belt, in U.
 fn width(problem: &Problem) -> f64 {
     problem.belt().width / problem.units().length
@@ -443,16 +483,7 @@ impl Level {
     /// A mesh for the ribs of the belt at another width, over its own.
     fn mesh_for_ribs(&self, problem: &Problem, times: f64) -> Mesh {
         let short = times * width(problem) / PER_WIDTH;
-        let elements = self.program.elements();
-        let lengths: Vec<f64> = elements
-            .map(
-                |(k, element)| match ribs_turn(&self.solution.at.point, (k, element)) {
-                    true => element.length.min(short),
-                    false => element.length.max(LONGEST),
-                },
-            )
-            .collect();
-        Mesh::of(problem, &self.program).graded(problem, &lengths, &[])
+        mesh_for_ribs(problem, &self.program, &self.solution.at.point, short, 0.0)
     }
 
     /// A mesh on which the error should be within the accuracy. A belt that may slide along itself has no place on a graded
