@@ -272,7 +272,7 @@ impl Quantities {
             energy: share_of(
                 self.energy - better.energy,
                 energies[0].max(energies[1]),
-                NOTHING * self.load.clamp(NOTHING, 1.0),
+                NOTHING * self.load.clamp(LIGHT, 1.0),
             ),
             position: match self.may_slide {
                 true => f64::NAN,
@@ -293,9 +293,11 @@ fn vectors(wrenches: Vec<Wrench>) -> Vec<Vector3<f64>> {
     wrenches.into_iter().flat_map(both).collect()
 }
 
-/// A force, moment or curvature that is nothing but rounding, in mean R_f/U² or R_f/U and in 1/U. An energy is the product of
-/// two of them.
+/// A force, moment or curvature that is nothing but rounding, in mean R_f/U² or R_f/U and in 1/U; also an energy under loads
+/// of one mean R_f/U².
 const NOTHING: f64 = 1e-7;
+/// Load, in mean R_f/U², below which the energy that is nothing but rounding falls no further.
+const LIGHT: f64 = 1e-4;
 
 /// A change as a share of the whole; 0 of nothing.
 fn share(change: f64, whole: f64) -> f64 {
