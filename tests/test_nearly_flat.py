@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers import clamped
 from scipy.integrate import quad
 
 import fishbone as fb
+from helpers import clamped
 
 RADIUS = 2.0 / math.pi
 START = {"at": "start", "position": [0.0, 0.0, 0.0], "rotation": [0.0, 0.0, 0.0]}
@@ -35,7 +35,7 @@ def _clamped(lift: float) -> fb.Scenario:
 def _of_narrow_arc() -> float:
     """Energy over the square of the lift of a narrow quarter arc, by Castigliano's theorem.
 
-    A force at the end bends the arc with the moment M and twists it with T. Of all ribs those that give way most have the
+    A force at the end bends the arc with the moment M and twists it with T. The ribs that give way most have the
     complementary energy ((|M| + hypot(M, T))/2)²/2.
     """
 
@@ -89,7 +89,7 @@ def test_tracker_leads_an_arc_off_the_plane_and_back() -> None:
     updates = [tracker.update([height, *END[1:]], turn) for height in heights]
     assert all(update.status == "converged" and not update.snapped for update in updates)
     energies = [update.energy for update in updates]
-    assert energies[3:5] == pytest.approx(energies[1::-1], rel=1e-5)
+    assert energies[3:5] == pytest.approx(energies[1::-1], rel=1e-4)
     assert energies[-1] == pytest.approx(0.0, abs=1e-12)
 
 

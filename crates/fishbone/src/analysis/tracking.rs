@@ -170,24 +170,25 @@ impl Tracker {
 
     /// Leads the support along a way. Next to the pose at which the board lies flat no tangent leads on: there it is solved.
     fn lead(&mut self, way: &mut Way, proceed: &mut dyn FnMut() -> ControlFlow<()>) -> Status {
-        let Some(share) = self.share_before_flat(way) else {
+        /// Length of a way without motion, in U and rad.
+        const NOWHERE: f64 = 1e-12;
+        let Some([from, to]) = self.beside_flat(way) else {
             return self.lead_along(way, proceed);
         };
-        let goal = way.goal;
-        if share > 0.0 {
-            way.goal = way.pose(share);
-            way.turn *= share;
+        let ends = [from, to, 1.0].map(|share| way.pose(share));
+        for (leg, end) in ends.into_iter().enumerate() {
+            (way.from, way.goal) = (self.pose, end);
+            way.turn = turn_between(&way.from.frame, &way.goal.frame);
+            let is_solved = leg == 1 && self.solve_beside_flat(way, proceed);
+            if is_solved || way.length() <= NOWHERE {
+                continue;
+            }
             let status = self.lead_along(way, proceed);
-            (way.from, way.goal) = (way.goal, goal);
-            way.turn = turn_between(&way.from.frame, &goal.frame);
             if status != Status::Converged {
                 return status;
             }
         }
-        match self.solve_beside_flat(way, proceed) {
-            true => Status::Converged,
-            false => self.lead_along(way, proceed),
-        }
+        Status::Converged
     }
 
     /// Leads the support along a way as far as a tangent leads on. Where the ribs come to other edges, the belt is followed up to the place, and goes on
@@ -255,22 +256,21 @@ impl Tracker {
         self.solve_at(way, proceed)
     }
 
-    /// Share of a way after which the board is solved beside its flat shape: 0 where it is nearly flat now, nearly all where
-    /// the way ends there; `None` of other ways.
-    fn share_before_flat(&self, way: &Way) -> Option<f64> {
+    /// The part of a way, from share to share, on which the board is solved beside its flat shape: the first part where it is
+    /// nearly flat now, the last where the way ends there; `None` of other ways.
+    fn beside_flat(&self, way: &Way) -> Option<[f64; 2]> {
         /// Distance to the pose at which the board is flat from which its shape is near to flat, in U and rad.
         const NEAR: f64 = 0.01;
         /// Elastic energy of such a board, in mean R_f/U.
         const ENERGY: f64 = 0.1;
         let flat = self.flat.as_ref()?;
-        let off = |pose: &Pose| distance(pose, flat);
+        let is_near = |pose: &Pose| distance(pose, flat) <= 0.5 * NEAR;
+        let part = NEAR / way.length();
         let size = self.follower.program().size(self.point());
-        match (
-            off(&way.from) <= NEAR && size <= ENERGY,
-            off(&way.goal) <= 0.5 * NEAR,
-        ) {
-            (true, _) => Some(0.0),
-            (false, true) => Some(1.0 - NEAR / way.length()).filter(|share| *share > 0.0),
+        match (is_near(&way.from) && size <= ENERGY, is_near(&way.goal)) {
+            (true, false) => Some([0.0, part.min(1.0)]),
+            (true, true) => Some([0.0, 1.0]),
+            (false, true) => Some([(1.0 - part).max(0.0), 1.0]),
             (false, false) => None,
         }
     }
