@@ -187,8 +187,6 @@ struct Quantities {
     /// Total potential with its zero at the world's origin, in mean R_f/U.
     energy: f64,
     elastic_energy: f64,
-    /// Sum of the sizes of all loads, in mean R_f/U².
-    load: f64,
     spine: Spine,
     /// Whether the belt may slide along itself, so that no position is determined.
     may_slide: bool,
@@ -221,7 +219,6 @@ impl Quantities {
         Self {
             energy: objective + problem.potential_of_origin() / problem.units().energy,
             elastic_energy: program.elastic_energy(&point.fields),
-            load: program.total_load(),
             reactions: program.reactions(point, equalities),
             links: program.link_forces(equalities),
             internal: vectors(internal),
@@ -269,11 +266,7 @@ impl Quantities {
         let changes = own.zip(&forces).map(|(own, better)| (own - better).norm());
         let energies = [better.energy.abs(), better.elastic_energy];
         MeshError {
-            energy: share_of(
-                self.energy - better.energy,
-                energies[0].max(energies[1]),
-                NOTHING * self.load.clamp(LIGHT, 1.0),
-            ),
+            energy: share(self.energy - better.energy, energies[0].max(energies[1])),
             position: match self.may_slide {
                 true => f64::NAN,
                 false => moves.fold(0.0, larger) / self.spine.length(),
@@ -293,20 +286,11 @@ fn vectors(wrenches: Vec<Wrench>) -> Vec<Vector3<f64>> {
     wrenches.into_iter().flat_map(both).collect()
 }
 
-/// A force, moment or curvature that is nothing but rounding, in mean R_f/U² or R_f/U and in 1/U; also an energy under loads
-/// of one mean R_f/U².
-const NOTHING: f64 = 1e-7;
-/// Load, in mean R_f/U², below which the energy that is nothing but rounding falls no further.
-const LIGHT: f64 = 1e-4;
-
 /// A change as a share of the whole; 0 of nothing.
 fn share(change: f64, whole: f64) -> f64 {
-    share_of(change, whole, NOTHING)
-}
-
-/// A change as a share of the whole; 0 of a whole up to `nothing`.
-fn share_of(change: f64, whole: f64, nothing: f64) -> f64 {
-    match whole <= nothing {
+    /// A whole that is nothing but rounding, in mean R_f/U and U.
+    const NOTHING: f64 = 1e-7;
+    match whole <= NOTHING {
         true => 0.0,
         false => (change / whole).abs(),
     }
