@@ -20,6 +20,7 @@ mod linear;
 mod linearisation;
 mod path;
 mod program;
+mod scaled;
 
 pub use interior_point::{
     Correction, Outcome, Residuals, Settings, Solution, assess, correct, minimise,

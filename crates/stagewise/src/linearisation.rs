@@ -113,6 +113,11 @@ impl<const X: usize, const U: usize, const N: usize> Linearisation<X, U, N> {
         pairs.zip(&self.pair_hessians)
     }
 
+    /// The second derivatives of the constraints between pairs.
+    pub(crate) fn pair_hessians_mut(&mut self) -> &mut [PairMatrix<N>] {
+        &mut self.pair_hessians
+    }
+
     /// Second derivative of the Lagrangian along two steps whose states have been carried along.
     pub fn second_derivative(&self, a: &[NodeVector<N>], b: &[NodeVector<N>]) -> f64 {
         let pairs = self.pair_hessians().map(|([first, second], hessian)| {

@@ -82,6 +82,14 @@ pub trait Program<const X: usize, const U: usize, const N: usize> {
         Scales::default()
     }
 
+    /// How large the objective is at a point, as its gradients and second derivatives tell, not beyond [`Scales::objective`];
+    /// not negative. Residuals are to be small beside it. Zero where the objective vanishes but for rounding.
+    ///
+    /// By default [`Scales::objective`].
+    fn size(&self, _point: &Self::Point) -> f64 {
+        self.scales().objective
+    }
+
     /// Carries the states of a point along the chain and evaluates the programme there; false outside the domain. Slacks and
     /// equalities are given also where inequalities alone are violated.
     fn evaluate(&self, point: &mut Self::Point, values: &mut Values) -> bool;
@@ -147,6 +155,10 @@ impl<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> Progra
 
     fn scales(&self) -> Scales {
         (*self).scales()
+    }
+
+    fn size(&self, point: &Self::Point) -> f64 {
+        (*self).size(point)
     }
 
     fn evaluate(&self, point: &mut Self::Point, values: &mut Values) -> bool {

@@ -1,6 +1,7 @@
 //! Continuation of equilibria along a path, stable or not: folds, bifurcations, and the minima to which the belt snaps.
 
 mod confirm;
+mod flat;
 mod search;
 mod trace;
 
@@ -293,7 +294,15 @@ pub fn follow(
         stations: settings.states,
         events: Events::Find,
     };
-    let start = family.continuation(pace).start(&solved.at, 0.0, true);
+    let off_flat = flat::off_flat(solved, path, settings, pace, proceed);
+    let is_off_flat = off_flat.is_some();
+    let (family, start) = match off_flat {
+        Some((family, start)) => (family, Some(start)),
+        None => {
+            let start = family.continuation(pace).start(&solved.at, 0.0, true);
+            (family, start)
+        }
+    };
     let is_flat = |point: &BeltPoint| point.fields.iter().all(is_flat);
     let start = start.ok_or_else(|| match is_flat(&solved.at.point) {
         true => NoBranch::Flat,
@@ -304,11 +313,13 @@ pub fn follow(
         branches: Vec::new(),
         settings: *settings,
     };
-    let diagram = search::run(&family, pace, diagram, start, proceed);
-    match diagram.branches.is_empty() {
-        true => Err(NoBranch::Singular),
-        false => Ok(diagram),
+    let mut diagram = search::run(&family, pace, diagram, start, proceed);
+    let first = diagram.branches.first_mut().ok_or(NoBranch::Singular)?;
+    if is_off_flat {
+        flat::begin_at(first, equilibrium, solved);
     }
+    flat::end_flat(&mut diagram, proceed);
+    Ok(diagram)
 }
 
 impl Summary {

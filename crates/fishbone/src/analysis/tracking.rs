@@ -1,8 +1,8 @@
 //! Tracking: an equilibrium is followed at the rate of a robot while one of its supports moves.
 
 use crate::equilibrium::{
-    Equilibrium, Solved, Status, Uncertified, is_slender_on_graded_mesh, minimum_next_to_on,
-    of_solution, slender_minimum_near, snapped_from, solve_near,
+    Equilibrium, Solved, Status, Uncertified, flat_pose, from_guess, is_slender_on_graded_mesh,
+    minimum_next_to_on, of_solution, slender_minimum_near, snapped_from, solve_near,
 };
 use crate::geometry::{Pose, Wrench, exp, log};
 use crate::names::named;
@@ -10,7 +10,7 @@ use crate::problem::program::{BeltPoint, BeltProgram};
 use crate::problem::{Mesh, Problem, Units};
 use crate::scenario::error::ScenarioError;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
-use stagewise::{Distance, FollowSettings, Follower, Residuals};
+use stagewise::{Distance, FollowSettings, Follower, Program, Residuals};
 use std::ops::ControlFlow;
 use thiserror::Error;
 
@@ -77,6 +77,8 @@ pub struct Tracker {
     is_slender: bool,
     /// Present pose of the support, in the units of the programme.
     pose: Pose,
+    /// Pose of the support at which the board lies flat and at rest, in the units of the programme.
+    flat: Option<Pose>,
     /// Difference between the scenario's potential and the programme's, for their origins.
     potential_of_origin: f64,
 }
@@ -113,6 +115,7 @@ impl Tracker {
                 frame,
                 position: (position - origin) / units.length,
             },
+            flat: flat_pose(&problem, &solved.program, support),
             potential_of_origin: equilibrium.energy - stored * units.energy,
             problem,
             follower,
@@ -170,9 +173,36 @@ impl Tracker {
         })
     }
 
-    /// Leads the support along a way. Where the ribs come to other edges, the belt is followed up to the place, and goes on
-    /// with these.
+    /// Leads the support along a way. Next to the pose at which the board lies flat no tangent leads on: there it is solved.
     fn lead(&mut self, way: &mut Way, proceed: &mut dyn FnMut() -> ControlFlow<()>) -> Status {
+        /// Length of a way without motion, in U and rad.
+        const NOWHERE: f64 = 1e-12;
+        let Some([from, to]) = self.beside_flat(way) else {
+            return self.lead_along(way, proceed);
+        };
+        let ends = [from, to, 1.0].map(|share| way.pose(share));
+        for (leg, end) in ends.into_iter().enumerate() {
+            (way.from, way.goal) = (self.pose, end);
+            way.turn = turn_between(&way.from.frame, &way.goal.frame);
+            let is_solved = leg == 1 && self.solve_beside_flat(way, proceed);
+            if is_solved || way.length() <= NOWHERE {
+                continue;
+            }
+            let status = self.lead_along(way, proceed);
+            if status != Status::Converged {
+                return status;
+            }
+        }
+        Status::Converged
+    }
+
+    /// Leads the support along a way as far as a tangent leads on. Where the ribs come to other edges, the belt is followed up
+    /// to the place, and goes on with these.
+    fn lead_along(
+        &mut self,
+        way: &mut Way,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Status {
         let support = self.support;
         let (mut done, mut ahead) = (0.0, 1.0);
         for _ in 0..SWITCHES {
@@ -285,6 +315,42 @@ impl Tracker {
         let released = self.energy() + work - found.energy;
         let by_meshes = self.problem.accuracy() * found.elastic_energy;
         released.abs() <= RELEASED * (most + by_meshes)
+    }
+
+    /// The part of a way, from share to share, on which the board is solved beside its flat shape: the first part where it is
+    /// nearly flat now, the last where the way ends there; `None` of other ways.
+    fn beside_flat(&self, way: &Way) -> Option<[f64; 2]> {
+        /// Distance to the pose at which the board is flat from which its shape is near to flat, in U and rad.
+        const NEAR: f64 = 0.01;
+        /// Elastic energy of such a board, in mean R_f/U.
+        const ENERGY: f64 = 0.1;
+        let flat = self.flat.as_ref()?;
+        let is_near = |pose: &Pose| distance(pose, flat) <= 0.5 * NEAR;
+        let part = NEAR / way.length();
+        let size = self.follower.program().size(self.point());
+        match (is_near(&way.from) && size <= ENERGY, is_near(&way.goal)) {
+            (true, false) => Some([0.0, part.min(1.0)]),
+            (true, true) => Some([0.0, 1.0]),
+            (false, true) => Some([(1.0 - part).max(0.0), 1.0]),
+            (false, false) => None,
+        }
+    }
+
+    /// Solves at the end of a way beside the flat shape; false where this finds no shape near by that can be followed.
+    fn solve_beside_flat(
+        &mut self,
+        way: &mut Way,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> bool {
+        let Ok(problem) = self.problem_at(&way.goal) else {
+            return false;
+        };
+        let found = from_guess(&problem, proceed);
+        way.iterations += found.iterations;
+        self.remember_start(way);
+        let moved = self.equilibrium().displacement(&found);
+        // A belt that is shortened by the square of a length leaves its flat shape by much this length.
+        moved <= way.length().sqrt() + self.problem.snap_size() && self.restart(&found)
     }
 
     fn remember_start(&mut self, way: &mut Way) {
@@ -500,6 +566,11 @@ impl Way {
         self.jump = self.jump.max(jump);
         self.released += released;
     }
+}
+
+/// Distance of two poses, displacement in U and turn in rad.
+fn distance(from: &Pose, to: &Pose) -> f64 {
+    (to.position - from.position).norm() + turn_between(&from.frame, &to.frame).norm()
 }
 
 /// The turn from one frame to another as a rotation vector in the axes of the first.

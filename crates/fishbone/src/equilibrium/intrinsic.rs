@@ -13,7 +13,7 @@ use crate::problem::{Problem, number};
 use crate::scenario::{Scenario, SupportSpec};
 use crate::surface::linking::half_turns;
 use nalgebra::Vector3;
-use stagewise::{Outcome, Settings, Solution, Stationary, redundant_equalities};
+use stagewise::{Outcome, Program, Settings, Solution, Stationary, redundant_equalities};
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 use std::sync::OnceLock;
@@ -174,11 +174,6 @@ fn find(
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> (Found, Option<String>) {
     let mut search = Search::of(problem);
-    let MinimumSettings {
-        cold_barrier,
-        close_barrier,
-        ..
-    } = search.settings;
     let uniform = || problem.program(problem.elements());
     let mut program = match from {
         Start::Near(mesh, _)
@@ -187,6 +182,14 @@ fn find(
         | Start::Downhill(mesh, _) => problem.program_on(mesh).unwrap_or_else(uniform),
         _ => uniform(),
     };
+    if let Start::Minimum(_, shape) = from {
+        search.settings = search.settings.beside(program.size(shape));
+    }
+    let MinimumSettings {
+        cold_barrier,
+        close_barrier,
+        ..
+    } = search.settings;
     if !problem.has_fixed_mesh() {
         let start = match from {
             Start::Guess => Some(None),

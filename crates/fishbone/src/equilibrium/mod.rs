@@ -5,6 +5,7 @@ mod active_set;
 mod flat;
 pub(crate) mod guess;
 mod intrinsic;
+mod lifted;
 mod refinement;
 mod search;
 mod side;
@@ -33,6 +34,7 @@ use std::sync::OnceLock;
 use thiserror::Error;
 
 pub(crate) use intrinsic::of_solution;
+pub(crate) use lifted::flat_pose;
 pub(crate) use search::{prolonged, prolonged_with_multipliers};
 
 named! {
@@ -323,8 +325,8 @@ enum Start<'a> {
     Downhill(&'a Mesh, &'a BeltPoint),
 }
 
-/// The equilibrium of a problem: found from the guess, or followed from a quarter turn where supports are turned by more than
-/// half a turn.
+/// The equilibrium of a problem: found from the guess, followed from a quarter turn where supports are turned by more than
+/// half a turn, or brought back from a larger lift where supports hold a board nearly in its flat shape.
 ///
 /// `proceed` is asked once an iteration whether to go on.
 pub(crate) fn from_guess(
@@ -333,7 +335,8 @@ pub(crate) fn from_guess(
 ) -> Equilibrium {
     match winding::wound(problem, proceed) {
         Some(found) => found,
-        None => beside_the_guess(problem, proceed),
+        None => lifted::brought_back(problem, proceed)
+            .unwrap_or_else(|| beside_the_guess(problem, proceed)),
     }
 }
 

@@ -47,6 +47,20 @@ impl Default for MinimumSettings {
     }
 }
 
+impl MinimumSettings {
+    /// The settings near to a minimum of an elastic energy: barriers that are high beside it would lead the ribs away.
+    pub(super) fn beside(self, energy: f64) -> Self {
+        /// Energy of a belt that is flat but for rounding, in mean R_f/U: there the barrier keeps the ribs calm.
+        const FLAT: f64 = 1e-12;
+        let share = if energy > FLAT { energy.min(1.0) } else { 1.0 };
+        Self {
+            warm_barrier: share * self.warm_barrier,
+            close_barrier: share * self.close_barrier,
+            ..self
+        }
+    }
+}
+
 /// Count of flat nodes from which a belt under load counts as flat, besides those of stiff pieces, as a share of all nodes.
 const FLAT_SHARE: f64 = 0.1;
 

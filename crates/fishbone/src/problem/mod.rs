@@ -127,6 +127,17 @@ impl Problem {
         self.on_the_same_belt(scenario)
     }
 
+    /// The same problem with other supports.
+    ///
+    /// # Errors
+    ///
+    /// [`ScenarioError`] where a scenario may not have them.
+    pub(crate) fn with_supports(&self, supports: Vec<SupportSpec>) -> Result<Self, ScenarioError> {
+        let mut scenario = Scenario::clone(&self.scenario);
+        scenario.supports = supports;
+        self.on_the_same_belt(scenario)
+    }
+
     /// The same problem with the origin of its programmes elsewhere, world axes.
     pub(crate) fn about(self, origin: Vector3<f64>) -> Self {
         Self { origin, ..self }

@@ -41,6 +41,11 @@ impl Barrier {
         self.heaviest
     }
 
+    /// The parameter at which a point of a residual counts as converged.
+    pub(crate) fn least(&self, tolerance: f64) -> f64 {
+        0.1 * tolerance / self.heaviest
+    }
+
     /// The product of slack and multiplier on the central path.
     pub(crate) fn target(&self, row: usize) -> f64 {
         self.parameter * self.weights[row]

@@ -2,7 +2,8 @@
 
 use super::PrimalDual;
 use crate::linear::chain::NodeVector;
-use crate::program::{Program, Stationary};
+use crate::program::{Multipliers, Program, Stationary};
+use crate::scaled::Scaled;
 use nalgebra::{SMatrix, SVector};
 
 /// What one Newton step makes of a point near to a stationary point.
@@ -29,6 +30,31 @@ pub struct Correction<P> {
 ///
 /// `tolerance` is the residual of a converged point, which sets the barrier.
 pub fn correct<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>(
+    program: &P,
+    tolerance: f64,
+    near: Stationary<P::Point>,
+) -> Option<Correction<P::Point>> {
+    let Some(scaled) = Scaled::of(program, tolerance, &near) else {
+        return corrected(program, tolerance, near);
+    };
+    let own = corrected(&scaled, tolerance, scaled.own(&near))?;
+    let gains = own.gains.iter();
+    let multipliers = Multipliers {
+        equalities: own.equalities,
+        inequalities: Vec::new(),
+    };
+    Some(Correction {
+        point: own.point,
+        equalities: scaled.multipliers_of_original(&multipliers).equalities,
+        objective: scaled.objective_of_original(own.objective),
+        gains: gains
+            .map(|gain| scaled.objective_of_original(*gain))
+            .collect(),
+    })
+}
+
+/// One Newton step from a point near to a stationary point, in the units of a programme.
+fn corrected<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>(
     program: &P,
     tolerance: f64,
     near: Stationary<P::Point>,

@@ -13,7 +13,8 @@ pub(crate) use primal_dual::PrimalDual;
 use crate::larger;
 use crate::layout::Layout;
 use crate::linear::Inertia;
-use crate::program::{Program, Stationary, Values};
+use crate::program::{Multipliers, Program, Stationary, Values};
+use crate::scaled::Scaled;
 use filter::{Filter, Measure};
 use line_search::SecondOrderCorrection;
 use restoration::Restoration;
@@ -106,7 +107,8 @@ impl<P> Solution<P> {
     }
 }
 
-/// Minimises a programme from a point of its domain.
+/// Minimises a programme from a point of its domain. Residuals are within the tolerance; where the objective is small, also
+/// beside its [size](Program::size), as far as rounding allows.
 ///
 /// `proceed` is called once an iteration, and interrupts by `Break`.
 pub fn minimise<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>(
@@ -117,7 +119,53 @@ pub fn minimise<P: Program<X, U, N>, const X: usize, const U: usize, const N: us
 ) -> Solution<P::Point> {
     let mut interior_point = InteriorPoint::new(program, *settings, start);
     let outcome = interior_point.iterate(proceed);
-    interior_point.finish(outcome)
+    let barrier = interior_point.iterate.barrier.parameter;
+    let found = interior_point.finish(outcome);
+    if outcome != Outcome::Converged || settings.iterations <= found.iterations {
+        return found;
+    }
+    match Scaled::of(program, settings.tolerance, &found.at) {
+        None => found,
+        Some(scaled) => {
+            let settings = Settings {
+                barrier,
+                iterations: settings.iterations - found.iterations,
+                ..*settings
+            };
+            sharpened(program, &scaled, settings, found, proceed)
+        }
+    }
+}
+
+/// A minimum found again in the units of what the objective is there; as it was where this does not keep the tolerance.
+fn sharpened<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>(
+    program: &P,
+    scaled: &Scaled<&P>,
+    settings: Settings,
+    found: Solution<P::Point>,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Solution<P::Point> {
+    let tolerance = settings.tolerance;
+    let settings = Settings {
+        barrier: scaled.own_objective(settings.barrier),
+        ..settings
+    };
+    let mut interior_point = InteriorPoint::new(scaled, settings, found.at.point.clone());
+    interior_point.start_from(&scaled.own(&found.at).multipliers);
+    interior_point.iterate(proceed);
+    let better = interior_point.finish(Outcome::Converged);
+    let at = Stationary {
+        multipliers: scaled.multipliers_of_original(&better.at.multipliers),
+        point: better.at.point,
+    };
+    let known = assess(program, tolerance, &at);
+    match known.outcome {
+        Outcome::Converged => Solution {
+            iterations: found.iterations + better.iterations,
+            ..known
+        },
+        _ => found.after(better.iterations),
+    }
 }
 
 /// Residuals and inertia of a given stationary point.
@@ -133,14 +181,24 @@ pub fn assess<P: Program<X, U, N>, const X: usize, const U: usize, const N: usiz
         longest_step: f64::INFINITY,
     };
     let mut interior_point = InteriorPoint::new(program, settings, at.point.clone());
-    let iterate = &mut interior_point.iterate;
-    iterate.multipliers.clone_from(&at.multipliers);
-    iterate.linearise();
-    let outcome = match iterate.residuals().largest() <= tolerance {
+    interior_point.start_from(&at.multipliers);
+    let outcome = match interior_point.iterate.residuals().largest() <= tolerance {
         true => Outcome::Converged,
         false => Outcome::IterationLimit,
     };
-    interior_point.finish(outcome)
+    let assessed = interior_point.finish(outcome);
+    match Scaled::of(program, tolerance, &assessed.at) {
+        None => assessed,
+        Some(scaled) => {
+            let at = scaled.own(&assessed.at);
+            let mut interior_point = InteriorPoint::new(&scaled, settings, at.point);
+            interior_point.start_from(&at.multipliers);
+            Solution {
+                inertia: interior_point.iterate.inertia(),
+                ..assessed
+            }
+        }
+    }
 }
 
 /// Depth of an objective that is unbounded below; in [`Scales::objective`](crate::Scales::objective). Also the damping beyond
@@ -220,6 +278,12 @@ impl<'a, P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>
             drag: 0.0,
             progress: Progress::NONE,
         }
+    }
+
+    /// Starts with multipliers in place of those on the central path.
+    fn start_from(&mut self, multipliers: &Multipliers) {
+        self.iterate.multipliers.clone_from(multipliers);
+        self.iterate.linearise();
     }
 
     fn iterate(&mut self, proceed: &mut dyn FnMut() -> ControlFlow<()>) -> Outcome {
@@ -375,10 +439,14 @@ impl<'a, P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>
     ///
     /// A loose tolerance does not apply here: it would drop small multipliers that are unique.
     fn prefer_zero_multipliers(&mut self) {
-        /// Stationarity residual at which the multipliers of the equalities are zero; in the unit of the gradient.
+        /// Stationarity residual at which the multipliers of the equalities are zero; in the unit of the gradient, or as a
+        /// share of the programme's size where that is smaller.
         const NEGLIGIBLE: f64 = 1e-8;
         let iterate = &mut self.iterate;
-        if iterate.stationarity_without_equalities() <= NEGLIGIBLE.min(self.settings.tolerance) {
+        let size = iterate.program.size(&iterate.point) / iterate.program.scales().objective;
+        let share = if size > 0.0 { size.min(1.0) } else { 1.0 };
+        let negligible = share * NEGLIGIBLE.min(self.settings.tolerance);
+        if iterate.stationarity_without_equalities() <= negligible {
             iterate.multipliers.equalities.fill(0.0);
             iterate.linearise();
         }

@@ -138,7 +138,7 @@ impl<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> Primal
     }
 
     fn least_barrier(&self, tolerance: f64) -> f64 {
-        0.1 * tolerance / self.barrier.heaviest()
+        self.barrier.least(tolerance)
     }
 
     /// Inertia of the second variation. Overwrites the derivatives.

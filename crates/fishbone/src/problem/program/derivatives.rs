@@ -4,6 +4,7 @@ use super::{BeltPoint, BeltProgram, DeadForce, Piece, ROWS, add_wrench, rows_of,
 use crate::geometry::{Pose, Twist, hat};
 use crate::strip::density::{Density, Derivatives, LANES, Loaded};
 use crate::strip::element::Element;
+use crate::strip::flat::FLAT;
 use nalgebra::{Matrix3, Matrix3x6, Matrix6, Vector6};
 use stagewise::{Layout, Linearisation, Multipliers, NodeVector, Program, StageMatrix, Values};
 
@@ -33,6 +34,14 @@ impl<D: Density<F>, const F: usize, const N: usize> Program<6, F, N> for BeltPro
         obstacles.fold(layout, |layout, contact| {
             layout.with_inequalities_at(contact.node, 1, contact.weight)
         })
+    }
+
+    /// The elastic energy: for given supports the square of how far a belt bends. Zero of a flat belt.
+    fn size(&self, point: &Self::Point) -> f64 {
+        match point.fields.iter().all(|fields| fields[0].abs() <= FLAT) {
+            true => 0.0,
+            false => self.elastic_energy(&point.fields).min(1.0),
+        }
     }
 
     fn evaluate(&self, point: &mut BeltPoint<F>, values: &mut Values) -> bool {

@@ -1,0 +1,90 @@
+//! Branches that begin or end at a flat board: there its ribs lie anyhow, so that no tangent leads off the plane.
+
+use super::{Branch, Diagram, End, Settings, State};
+use crate::analysis::family::{Along, Station};
+use crate::analysis::path::Path;
+use crate::equilibrium::{Equilibrium, Solved, from_guess};
+use crate::problem::Mesh;
+use stagewise::{Pace, Program};
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+/// Whether a belt is flat and free of loads.
+fn is_at_rest(solved: &Solved) -> bool {
+    !solved.program.is_loaded() && solved.program.size(&solved.at.point) == 0.0
+}
+
+/// The start of the branch that leaves a flat board at rest: a minimum a little on along the path, with the path on its mesh;
+/// `None` of another start, where the board stays flat, and where no minimum is found.
+pub(super) fn off_flat(
+    solved: &Solved,
+    path: &Path,
+    settings: &Settings,
+    pace: Pace,
+    proceed: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
+) -> Option<(Along, Station)> {
+    /// Places to start from, in the longest step, tried in turn.
+    const PLACES: [f64; 3] = [0.2, 1.0, 0.05];
+    if !is_at_rest(solved) {
+        return None;
+    }
+    PLACES.into_iter().find_map(|share| {
+        let place = (share * settings.step).min(path.length());
+        let problem = path.at(place)?;
+        let found = from_guess(&problem, &mut || proceed(0, place));
+        let solved = found.certified().ok()?;
+        if is_at_rest(solved) || found.stable() == Some(false) {
+            return None;
+        }
+        let family = Along {
+            path: path.clone(),
+            mesh: Mesh::of(&problem, &solved.program),
+        };
+        let start = family.continuation(pace).start(&solved.at, place, true)?;
+        Some((family, start))
+    })
+}
+
+/// The state at an equilibrium.
+fn state(equilibrium: &Equilibrium, solved: &Solved, place: f64) -> State {
+    State {
+        place,
+        negative_modes: equilibrium.stability.map_or(0, |s| s.negative_modes),
+        residuals: equilibrium.residuals,
+        at: solved.at.clone(),
+        mesh: Arc::new(Mesh::of(equilibrium.problem(), &solved.program)),
+    }
+}
+
+/// Puts a flat start before the first state of a branch.
+pub(super) fn begin_at(branch: &mut Branch, flat: &Equilibrium, solved: &Solved) {
+    branch.states.insert(0, state(flat, solved, 0.0));
+    for event in &mut branch.events {
+        event.state += 1;
+    }
+}
+
+/// Ends the first branch at the end of the path where it was lost next to it and the board lies flat there.
+pub(super) fn end_flat(
+    diagram: &mut Diagram,
+    proceed: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
+) -> Option<()> {
+    /// Displacement of a node up to which a flat board is next to a state, in U.
+    const NEAR: f64 = 0.05;
+    let (path, branch) = (&diagram.path, diagram.branches.first()?);
+    let (end, last) = (path.length(), branch.states.last()?);
+    if branch.end != End::Lost || end - last.place > diagram.settings.step {
+        return None;
+    }
+    let flat = from_guess(&path.at(end)?, &mut || proceed(0, end));
+    let solved = flat.certified().ok().filter(|solved| is_at_rest(solved))?;
+    let here = diagram.equilibrium(0, branch.states.len() - 1);
+    if here.displacement(&flat) > NEAR {
+        return None;
+    }
+    let state = state(&flat, solved, end);
+    let branch = &mut diagram.branches[0];
+    branch.states.push(state);
+    branch.end = End::Range;
+    Some(())
+}
