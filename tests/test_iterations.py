@@ -16,7 +16,7 @@ ITERATIONS = {
     "curved": 24,
     "example1": 19,
     "example2": 31,
-    "hinge": 103,
+    "hinge": 83,
     "mobius": 71,
     "planar": 10,
     "polystyrene": 25,

@@ -206,8 +206,9 @@ pub(super) fn variables(at: [f64; 2]) -> [Dual2SVec64<2>; 2] {
 
 /// Argument t below which the square root of a rib that all but misses its inner edge is continued, dimensionless.
 ///
-/// Ribs whose root is exact do not cross on the board; so it is small.
-const SMALL: f64 = 1e-3;
+/// Such ribs may cross within the last twentieth of their length. With a smaller one, ribs that come to miss the edge do so
+/// all at once, and paths fold there.
+const SMALL: f64 = 0.01;
 
 /// √t, continued below a small t by a positive function with the same value and first two derivatives: a square root would
 /// end at 0.
