@@ -281,10 +281,13 @@ pub fn follow(
     settings: &Settings,
     proceed: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
 ) -> Result<Diagram, NoBranch> {
-    let solved = equilibrium.certified()?;
+    equilibrium.certified()?;
     if path.base().has_no_slack() {
         return Err(NoBranch::Taut);
     }
+    let suited = equilibrium.for_paths(&mut || proceed(0, 0.0));
+    let equilibrium = suited.as_ref().unwrap_or(equilibrium);
+    let solved = equilibrium.certified()?;
     let family = Along {
         path: path.clone(),
         mesh: Mesh::of(path.base(), &solved.program),

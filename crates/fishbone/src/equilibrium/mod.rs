@@ -231,6 +231,22 @@ impl Equilibrium {
         (found.status == Status::Converged).then_some(found)
     }
 
+    /// The same minimum on a mesh for shapes to which a path may lead: its own mesh is fine where the ribs of its own shape
+    /// turn. `None` where the scenario fixes the mesh, of a saddle, of a belt so slender that such a mesh has too many
+    /// elements, and where no minimum is found next to this one.
+    pub(crate) fn for_paths(&self, proceed: &mut dyn FnMut() -> ControlFlow<()>) -> Option<Self> {
+        let solved = self.solved.as_ref()?;
+        if self.problem.has_fixed_mesh() || !self.is_minimum() {
+            return None;
+        }
+        let mesh = refinement::mesh_for_ribs_anywhere(&self.problem, &solved.program)?;
+        let program = self.problem.program_on(&mesh)?;
+        let shape = search::prolong(&solved.program, &solved.at.point, &program);
+        let found = minimum_next_to_on(&self.problem, &mesh, &shape, proceed);
+        let is_same = found.is_minimum() && self.displacement(&found) <= NEXT;
+        is_same.then_some(found)
+    }
+
     /// The same equilibrium, minimum or not, on a mesh of another number of elements; `None` if no equilibrium is found next
     /// to it, or if a scenario may not have so many elements.
     ///
@@ -287,8 +303,6 @@ impl Equilibrium {
         shape: &BeltPoint,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Option<Self> {
-        /// Displacement of nodes up to which nothing is left, in U.
-        const SAME: f64 = 1e-3;
         let mesh = Mesh::uniform(problem, problem.elements());
         let mut from = |start| {
             let found = intrinsic::solve(problem, start, proceed);
@@ -297,7 +311,7 @@ impl Equilibrium {
         };
         let close = from(Start::Close(&mesh, shape));
         let nearest = match close {
-            Some((displacement, _)) if displacement <= SAME => close,
+            Some((displacement, _)) if displacement <= NEXT => close,
             _ => {
                 let both = [close, from(Start::Near(&mesh, shape))];
                 let found = both.into_iter().flatten();
@@ -307,6 +321,9 @@ impl Equilibrium {
         nearest.map(|(_, found)| found)
     }
 }
+
+/// Displacement of nodes up to which a minimum on another mesh is surely the same, in U.
+const NEXT: f64 = 1e-3;
 
 /// The start of a search.
 #[derive(Clone, Copy)]

@@ -252,6 +252,17 @@ fn mesh_for_ribs(
     Mesh::of(problem, program).graded(problem, &lengths, &[])
 }
 
+/// The mesh of a programme with elements split so that ribs may come to turn anywhere; `None` where it would have too many.
+pub(super) fn mesh_for_ribs_anywhere(problem: &Problem, program: &BeltProgram) -> Option<Mesh> {
+    /// Greatest number of elements.
+    const MOST: usize = 1000;
+    let short = width(problem) / PER_WIDTH;
+    let lengths = program.elements().map(|(_, e)| e.length.min(short));
+    let lengths: Vec<f64> = lengths.collect();
+    let mesh = Mesh::of(problem, program).graded(problem, &lengths, &[]);
+    (mesh.elements() <= MOST).then_some(mesh)
+}
+
 /// The width of a belt, in U.
 fn width(problem: &Problem) -> f64 {
     problem.belt().width / problem.units().length
