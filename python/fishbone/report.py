@@ -25,6 +25,7 @@ ENDS: dict[End, str] = {
     "budget": "has used up its states before the end of the path",
     "lost": "ends where no step, however short, leads on",
     "taut": "ends where the belt is drawn straight",
+    "unstable": "ends where the belt snaps",
     "edges": "ends where ribs beside a bend come to other edges of the board, and no equilibrium is found with these",
 }
 """The printed reason of the end of a branch that does not end with the path."""

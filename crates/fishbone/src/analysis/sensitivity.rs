@@ -125,6 +125,9 @@ impl Equilibrium {
         if solved.inertia.is_some_and(|inertia| inertia.negative > 0) {
             return Err(NoSensitivity::Saddle);
         }
+        if self.problem.has_no_slack() {
+            return Err(NoSensitivity::NoSlack);
+        }
         if solved.is_flat {
             return Err(NoSensitivity::Flat);
         }

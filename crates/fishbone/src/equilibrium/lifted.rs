@@ -62,11 +62,10 @@ fn farther(problem: &Problem) -> Option<(Problem, f64)> {
             ]
         })
         .collect();
-    let largest = |part: fn(&(Vector3<f64>, Vector3<f64>)) -> &Vector3<f64>| {
-        let sizes = moves.iter().flatten().map(|both| part(both).norm());
-        sizes.fold(0.0, f64::max)
-    };
-    let (lift, inside) = (largest(|both| &both.0), largest(|both| &both.1));
+    let both = moves.iter().flatten();
+    let [lift, inside] = both.fold([0.0f64; 2], |[most_off, most_inside], (off, inside)| {
+        [most_off.max(off.norm()), most_inside.max(inside.norm())]
+    });
     let is_near = lift > 0.0 && lift < LIFT && inside <= IN_PLANE * lift * lift;
     if !is_near {
         return None;

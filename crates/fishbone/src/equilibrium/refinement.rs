@@ -449,14 +449,10 @@ impl Level {
             Outcome::Converged => 1,
             _ => 0,
         };
-        let error = |level: &Self| match &level.estimate {
-            Some(estimate) => estimate.error.largest(),
-            None => f64::INFINITY,
-        };
-        (rank(self), -error(self)) >= (rank(other), -error(other))
+        (rank(self), -self.largest_error()) >= (rank(other), -other.largest_error())
     }
 
-    /// Whether the mesh is much finer than another level's, and yet the error much the same: as where a density that does not
+    /// Whether the mesh is much finer than another level's, and yet the error no smaller: as where a density that does not
     /// know the width folds the belt into facets, finer ones on a finer mesh.
     fn is_in_vain_after(&self, other: &Self) -> bool {
         /// Number of elements up to which further ones may still pay.
@@ -466,13 +462,15 @@ impl Level {
         /// Error over the other's that is much the same, dimensionless.
         const SAME: f64 = 0.7;
         let elements = |level: &Self| level.program.elements().count() as f64;
-        let error = |level: &Self| level.estimate.as_ref().map(|e| e.error.largest());
-        let known = |error: &f64| *error <= LARGE;
-        elements(self) >= FEW.max(FINER * elements(other))
-            && match (error(self).filter(known), error(other).filter(known)) {
-                (Some(own), Some(others)) => own > SAME * others,
-                _ => false,
-            }
+        let is_finer = elements(self) >= FEW.max(FINER * elements(other));
+        let [own, others] = [self, other].map(Self::largest_error);
+        is_finer && others <= LARGE && own > SAME * others
+    }
+
+    /// The largest estimated error; infinite where none is known.
+    fn largest_error(&self) -> f64 {
+        let estimate = self.estimate.as_ref();
+        estimate.map_or(f64::INFINITY, |estimate| estimate.error.largest())
     }
 
     /// The largest angle by which an element turns.

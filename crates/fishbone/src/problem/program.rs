@@ -22,7 +22,8 @@ pub use link::{NodeLink, Tie};
 pub(crate) use load::weight;
 pub use load::{DeadForce, NodeLoad};
 pub use obstacle::{NodeObstacle, Obstacle};
-pub use piece::{Piece, slope_beyond};
+pub use piece::Piece;
+pub(crate) use piece::slope_beyond;
 pub(crate) use support::Turn;
 pub use support::{Hold, NodeSupport};
 

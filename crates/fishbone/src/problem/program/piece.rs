@@ -47,7 +47,7 @@ impl Piece {
 
 /// The rib slope beyond a bend of the board by χ, with two derivatives; `None` where the rib would leave through the
 /// bend: a rib there is one material line, α⁺ = α⁻ − χ.
-pub fn slope_beyond(slope: f64, angle: f64) -> Option<[f64; 3]> {
+pub(crate) fn slope_beyond(slope: f64, angle: f64) -> Option<[f64; 3]> {
     let (sine, cosine) = angle.sin_cos();
     let denominator = cosine + slope * sine;
     (denominator > 0.0).then(|| {
