@@ -69,10 +69,19 @@ def apart(found: list[fb.Equilibrium], count: int) -> list[fb.Equilibrium]:
     """The lowest shapes that differ from all lower ones by a fifth of the length somewhere."""
     chosen: list[fb.Equilibrium] = []
     for shape in found:
-        moves = [np.linalg.norm(shape.position - lower.position, axis=1).max() for lower in chosen]
+        moves = [np.linalg.norm(places(shape) - places(lower), axis=1).max() for lower in chosen]
         if min(moves, default=1.0) > APART:
             chosen.append(shape)
     return chosen[:count]
+
+
+def places(shape: fb.Equilibrium) -> Floats:
+    """Places of the spine at the same arc lengths on any mesh.
+
+    Shape: (101, 3)
+    """
+    u = np.linspace(0.0, shape.u[-1], 101)
+    return np.stack([np.interp(u, shape.u, x) for x in shape.position.T], axis=1)
 
 
 @functools.cache
