@@ -172,7 +172,7 @@ def slacks(shape: Shape) -> tuple[Array, Array]:
 
 
 def meet_edges(shape: Shape) -> npt.NDArray[np.bool_]:
-    """Ribs that meet the edges of their own arc, not at a graze: others leave across edges that this audit does not know.
+    """Ribs that meet the edges of their own arc, not at a graze; others leave across edges unknown here.
 
     Shapes: (m, 2) of the elements, −ζ and +ζ
     """

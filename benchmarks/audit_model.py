@@ -139,7 +139,7 @@ def density(model: str, fields: tuple[Any, ...], board: tuple[Any, ...]) -> Any:
 
 
 def rib_end(geodesic: Any, square: Any, width: float, side: float) -> Any:
-    """Where a rib meets the edge on a side: v of v − κ_g v² (1 + β²)/2 = ±V/2 − κ_g V²/8; no number where it passes by."""
+    """Where a rib meets the edge on a side: v of v − κ_g v² (1 + β²)/2 = ±V/2 − κ_g V²/8; NaN where it passes by."""
     reach, below = rib_root(geodesic, square, width, side)
     # Twice the reach over one and the root has no difference of near numbers.
     with np.errstate(invalid="ignore"):
@@ -147,7 +147,7 @@ def rib_end(geodesic: Any, square: Any, width: float, side: float) -> Any:
 
 
 def rib_root(geodesic: Any, square: Any, width: float, side: float) -> tuple[Any, Any]:
-    """How far a rib reaches where it is square, and what is below the root of its end: not positive where it passes by."""
+    """How far a rib reaches where it is square, and what is below the root of its end: negative if it passes by."""
     reach = side * width / 2.0 - geodesic * width**2 / 8.0
     return reach, 1.0 - 2.0 * geodesic * square * reach
 
