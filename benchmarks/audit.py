@@ -6,6 +6,7 @@ the fields at the nodes; `failures` lists those that do not hold.
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -315,7 +316,10 @@ def joined(shape: Shape) -> csr_array:
 
 
 def is_held(shape: Shape) -> npt.NDArray[np.bool_]:
-    """Nodes whose rib slope is prescribed or, beside corners, may be bounded by edges that this audit does not know."""
+    """Nodes whose rib slope is prescribed, or may be bounded by edges that this audit does not know.
+
+    These are beside corners, and where ribs lean past the end of their own arc.
+    """
     held = np.zeros(len(shape.u), dtype=bool)
     for k in np.flatnonzero(shape.is_rigid):
         held |= np.abs(shape.u - shape.at[k, 0]) <= SAME_PLACE * shape.board.length
@@ -325,8 +329,12 @@ def is_held(shape: Shape) -> npt.NDArray[np.bool_]:
         square = "position" in support and "rotation" in support and shape.board.place(support["at"]) in ends
         if support.get("square_rib", square):
             held |= np.abs(shape.u - shape.board.place(support["at"])) <= SAME_PLACE * shape.board.length
-    reach = shape.board.width * (1.0 + np.abs(shape.slope))
+    lean = shape.board.width * np.abs(shape.slope)
     for place, segment in zip(shape.board.ends[1:], shape.board.segments, strict=True):
         if segment["kind"] == "corner":
-            held |= np.abs(shape.u - place) < 2.0 * reach
+            held |= np.abs(shape.u - place) < 2.0 * (shape.board.width + lean)
+    curvatures = [segment.get("curvature", 0.0) for segment in shape.board.segments]
+    for place, (before, after) in zip(shape.board.ends[1:-1], pairwise(curvatures), strict=True):
+        if before != after:
+            held |= np.abs(shape.u - place) < lean
     return held
