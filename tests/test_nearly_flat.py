@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
 from scipy.integrate import quad
 
 import fishbone as fb
+from fishbone.names import EnergyModel
 from helpers import clamped
 
 RADIUS = 2.0 / math.pi
@@ -100,3 +101,16 @@ def test_path_leads_an_arc_off_the_plane() -> None:
     assert branch.energy[0] == pytest.approx(0.0, abs=1e-12)
     near = fb.solve(_clamped(float(branch.parameter[2])))
     assert branch.energy[2] == pytest.approx(near.energy, rel=2e-3)
+
+
+@pytest.mark.parametrize("energy", get_args(EnergyModel))
+@pytest.mark.parametrize(
+    ("curvature", "width"), [(2.0, 0.3), (2.0, 0.2), (4.0, 0.05), (4.0, 0.1), (6.0, 0.03), (6.0, 0.1)]
+)
+def test_unloaded_flat_arc_is_stable(energy: EnergyModel, curvature: float, width: float) -> None:
+    """Its energy is 0, and none is negative."""
+    belt = {"width": width, "rigidity": 1.0, "segments": [{"kind": "arc", "length": 1.0, "curvature": curvature}]}
+    held = [{"at": "start", "position": [0.0, 0.0, 0.0], "rotation": [0.0, 0.0, 0.0]}]
+    found = fb.solve(fb.Scenario.from_dict({"energy": energy, "belt": belt, "supports": held}), strict=True)
+    assert found.energy == pytest.approx(0.0, abs=1e-20)
+    assert found.stable

@@ -36,15 +36,17 @@ impl<P> Scaled<P> {
     {
         /// Unit of the objective, in the programme's, above which the programme's own do.
         const SMALL: f64 = 0.1;
+        /// Size up to which an objective is nothing but rounding, in the programme's unit.
+        const NOTHING: f64 = 1e-20;
         /// Rounding of a gradient as a share of the largest multiplier, dimensionless.
         const ROUNDING: f64 = 10.0 * f64::EPSILON;
         let unit = program.scales().objective;
         let multiplier = largest(at.multipliers.equalities.iter());
-        let size = program.size(&at.point) / unit;
-        let size = size.max(ROUNDING / tolerance * multiplier / unit);
+        let own = program.size(&at.point) / unit;
+        let size = own.max(ROUNDING / tolerance * multiplier / unit);
         // A power of four, the root of which is exact: scaling does not round.
         let exponent = (0.5 * size.log2()).round();
-        let is_small = size > 0.0 && size < SMALL;
+        let is_small = own > NOTHING && size < SMALL;
         is_small.then(|| Self {
             objective: (-2.0 * exponent).exp2(),
             equality: (-exponent).exp2(),
