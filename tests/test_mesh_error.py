@@ -186,3 +186,25 @@ def test_ends_drawn_past_each_other_are_carried_or_refused() -> None:
         found = fb.solve(fb.Scenario.from_dict(scenario(clamps([0.0, distance, 0.0], CLAMP))))
         turns = np.einsum("kij,kij->k", found.frame[:-1], found.frame[1:])
         assert found.status != "converged" or np.arccos(0.5 * (turns.min() - 1.0)) <= 0.5
+
+
+def test_error_does_not_depend_on_where_the_world_has_its_origin() -> None:
+    tip = [{"at": "end", "force": [30.0, 0.0, 0.0]}]
+    free = {"at": "start", "position": [0.0, "free", 0.0], "rotation": CLAMP}
+    held_along = {"at": 0.5, "position": ["free", 0.5, "free"]}
+    for supports in ([clamps([0.0, 0.0, 0.0], CLAMP)[0]], [free, held_along]):
+        errors = []
+        for way in ([0.0, 0.0, 0.0], [1e3, -2e3, 5e2]):
+            tables = scenario(supports, loads={"points": tip})
+            moved = [
+                support
+                | {
+                    "position": [
+                        x if x == "free" else x + shift for x, shift in zip(support["position"], way, strict=True)
+                    ]
+                }
+                for support in supports
+            ]
+            errors.append(solve(tables | {"supports": moved}, elements=40).error)
+        assert np.allclose(errors[0], errors[1], rtol=1e-3), errors
+        assert errors[0].energy > 1e-8

@@ -65,6 +65,20 @@ def test_energy_over_the_square_of_the_lift_is_a_constant_and_half_the_force() -
     assert np.allclose(energies, energies[-1], rtol=2e-6)
     assert np.allclose(forces, 2.0 * np.array(energies), rtol=1e-5)
     assert all(belt.iterations <= 100 for belt in belts)
+    # A board as flat as that is no more accurate than another.
+    assert np.allclose([belt.error.energy for belt in belts], belts[0].error.energy, rtol=1e-3)
+    assert belts[0].error.energy > 1e-5
+
+
+def test_error_of_a_board_that_is_all_but_flat_is_not_known_and_of_a_flat_one_nought() -> None:
+    belt = _lifted(1e-8)
+    assert belt.status == "converged"
+    assert math.isnan(belt.error.energy)
+    assert belt.to_dict()["error"]["energy"] is None
+    assert len(belt.u) < 200
+    flat = _lifted(0.0)
+    assert flat.error.energy == flat.error.force == flat.error.radius == 0.0
+    assert len(flat.u) < 200
 
 
 @pytest.mark.parametrize("lift", [1e-3, 1e-4])

@@ -89,10 +89,13 @@ class Residuals(NamedTuple):
 
 
 class MeshError(NamedTuple):
-    """Estimated errors of a result by its mesh, relative and not negative; NaN where a quantity is not determined."""
+    """Estimated errors of a result by its mesh, relative and not negative.
+
+    NaN where a quantity is not determined, or so small that its error is not known; 0 where it is zero.
+    """
 
     energy: float
-    """Error of the energy over the energy, or over the elastic energy where that is larger."""
+    """Error of the energy, the zero of potentials at the belt's start, over it or a larger elastic energy."""
     position: float
     """Largest error of a position on the spine over U; NaN of a closed belt that may slide along itself."""
     force: float

@@ -11,17 +11,18 @@ use nalgebra::Vector3;
 use stagewise::{Distance, Outcome, Solution, Stationary, Values};
 use std::ops::ControlFlow;
 
-/// Estimated errors of a result by its mesh, relative and not negative; NaN where a quantity is not determined.
+/// Estimated errors of a result by its mesh, relative and not negative; NaN where a quantity is not determined, or so small
+/// that its error is not known, and 0 where it is zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeshError {
-    /// Error of the energy over the energy, or over the elastic energy where that is larger.
+    /// Error of the energy over the energy, with the zero of potentials at the belt's start, or over the elastic energy where
+    /// that is larger.
     pub energy: f64,
     /// Largest error of a position on the spine over U; NaN of a belt that may slide along itself.
     pub position: f64,
-    /// Largest error of a reaction or link force over the largest of them, forces in R_f/U² and moments in R_f/U; 0 where
-    /// all are zero.
+    /// Largest error of a reaction or link force over the largest of them, forces in R_f/U² and moments in R_f/U.
     pub force: f64,
-    /// Error of the tightest bend on the spine over this bend; 0 of a flat belt.
+    /// Error of the tightest bend on the spine over this bend.
     pub radius: f64,
 }
 
@@ -50,10 +51,10 @@ impl MeshError {
         self.energy.max(self.position).max(self.force)
     }
 
-    /// Whether all errors are numbers, but for the position of a belt that may slide.
-    fn is_known(&self, may_slide: bool) -> bool {
-        let known = [self.energy, self.force, self.radius];
-        known.iter().all(|error| error.is_finite()) && (may_slide || self.position.is_finite())
+    /// Whether no error is infinite.
+    fn is_finite(&self) -> bool {
+        let errors = [self.energy, self.position, self.force, self.radius];
+        !errors.into_iter().any(f64::is_infinite)
     }
 
     fn times(&self, factor: f64) -> Self {
@@ -79,6 +80,8 @@ pub(super) struct Estimate {
 impl Estimate {
     /// Change from which one Newton step tells no more than that the error is large, relative.
     pub(super) const WILD: f64 = 0.02;
+    /// Error over its change on halving all elements, dimensionless.
+    const OVER_CHANGE: f64 = 1.2;
 
     /// The estimate for a solution of a problem's programme; `None` where the finer mesh has no solution next to it. Where one
     /// Newton step changes a quantity by more than `most`, relative, the equilibrium of the finer mesh is searched instead.
@@ -93,8 +96,6 @@ impl Estimate {
         most: f64,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Option<Self> {
-        /// Error over its change on halving all elements, dimensionless.
-        const OVER_CHANGE: f64 = 1.2;
         let mesh = Mesh::of(problem, program);
         let fine = problem.program_on(&mesh.halved())?;
         // On an arc, ribs that nearly meet in an element meet in one of its halves.
@@ -108,6 +109,11 @@ impl Estimate {
             &at.multipliers.equalities,
             values.objective,
         );
+        if fine.is_at_rest(&near.point) {
+            let same = (near.point, near.multipliers.equalities, 0.0);
+            let error = own.off_on(problem, &fine, &same);
+            return Some(Self::at_rest(error, program.elements().count()));
+        }
         let step = stagewise::correct(&fine, problem.tolerance(), near.clone())?;
         let mut better = (step.point, step.equalities, step.objective);
         let mut error = own.off_on(problem, &fine, &better);
@@ -146,14 +152,23 @@ impl Estimate {
             let change = curvatures.iter().map(|[better, own]| (better - own).abs());
             [most.fold(0.0, f64::max), change.fold(0.0, f64::max)]
         };
-        error.is_known(own.may_slide).then(|| Self {
-            error: error.times(OVER_CHANGE),
+        error.is_finite().then(|| Self {
+            error: error.times(Self::OVER_CHANGE),
             gains: middles
                 .clone()
                 .map(|middle| step.gains[middle].max(f64::MIN_POSITIVE))
                 .collect(),
             curvatures: middles.map(in_element).collect(),
         })
+    }
+
+    /// The estimate of a belt that lies without load and energy: no element contributes to its error.
+    fn at_rest(error: MeshError, elements: usize) -> Self {
+        Self {
+            error: error.times(Self::OVER_CHANGE),
+            gains: vec![f64::MIN_POSITIVE; elements],
+            curvatures: vec![[0.0; 2]; elements],
+        }
     }
 }
 
@@ -200,8 +215,10 @@ type Wrench = (Vector3<f64>, Vector3<f64>);
 
 /// The quantities of which the error is estimated.
 struct Quantities {
-    /// Total potential with its zero at the world's origin, in mean R_f/U.
+    /// Total potential with its zero at the programme's origin, in mean R_f/U.
     energy: f64,
+    /// Difference between the total potential with its zero at the belt's start and the energy, in mean R_f/U.
+    potential_of_start: f64,
     elastic_energy: f64,
     spine: Spine,
     /// Whether the belt may slide along itself, so that no position is determined.
@@ -233,7 +250,8 @@ impl Quantities {
             undetermined.set(0.0, &mut [], &mut [], &mut internal);
         }
         Self {
-            energy: objective + problem.potential_of_origin() / problem.units().energy,
+            energy: objective,
+            potential_of_start: program.total_force().dot(&point.poses[0].position),
             elastic_energy: program.elastic_energy(&point.fields),
             reactions: program.reactions(point, equalities),
             links: program.link_forces(equalities),
@@ -280,12 +298,16 @@ impl Quantities {
         let forces = better.determined_with(self);
         let own = self.determined_with(better).into_iter();
         let changes = own.zip(&forces).map(|(own, better)| (own - better).norm());
-        let energies = [better.energy.abs(), better.elastic_energy];
+        let from_start = better.energy + better.potential_of_start;
         MeshError {
-            energy: share(self.energy - better.energy, energies[0].max(energies[1])),
+            energy: share_above(
+                SMALL * SMALL,
+                self.energy - better.energy,
+                from_start.abs().max(better.elastic_energy),
+            ),
             position: match self.may_slide {
                 true => f64::NAN,
-                false => moves.fold(0.0, larger) / self.spine.length(),
+                false => wrong_if_nan(moves.fold(0.0, larger) / self.spine.length()),
             },
             force: share(
                 changes.fold(0.0, larger),
@@ -302,14 +324,28 @@ fn vectors(wrenches: Vec<Wrench>) -> Vec<Vector3<f64>> {
     wrenches.into_iter().flat_map(both).collect()
 }
 
-/// A change as a share of the whole; 0 of nothing.
+/// Force in R_f/U², moment in R_f/U, or curvature in 1/U, below which its error is not known; the energy of such is its square.
+const SMALL: f64 = 1e-7;
+
+/// A change of a force or a curvature as a share of the whole.
 fn share(change: f64, whole: f64) -> f64 {
-    /// A whole that is nothing but rounding, in mean R_f/U and U.
+    share_above(SMALL, change, whole)
+}
+
+/// A change as a share of the whole: NaN of a whole that is small, 0 of one that is nothing but rounding beside a small one.
+fn share_above(small: f64, change: f64, whole: f64) -> f64 {
+    /// What is nothing but rounding, as a share of what is small.
     const NOTHING: f64 = 1e-7;
-    match whole <= NOTHING {
-        true => 0.0,
-        false => (change / whole).abs(),
+    match whole {
+        whole if whole <= NOTHING * small => 0.0,
+        whole if whole <= small => f64::NAN,
+        _ => wrong_if_nan((change / whole).abs()),
     }
+}
+
+/// An error, infinite where it is NaN, so that it is no small one.
+fn wrong_if_nan(error: f64) -> f64 {
+    if error.is_nan() { f64::INFINITY } else { error }
 }
 
 /// The larger of two numbers; NaN where either is NaN, so that no NaN is lost.
@@ -322,23 +358,26 @@ mod tests {
     use super::*;
 
     #[test]
-    fn test_number_that_is_none_is_no_small_error() {
+    fn test_number_that_is_none_is_no_small_error_and_a_small_whole_has_none() {
         let small = MeshError {
             energy: 1e-6,
             position: 1e-6,
             force: 1e-6,
             radius: 1e-6,
         };
-        assert!(small.is_known(false));
-        let slides = MeshError {
+        let not_known = MeshError {
             position: f64::NAN,
             ..small
         };
-        assert!(slides.is_known(true) && !slides.is_known(false));
-        for energy in [f64::NAN, f64::INFINITY] {
-            assert!(!MeshError { energy, ..small }.is_known(true));
+        assert!(small.is_finite() && not_known.is_finite() && not_known.largest() == 1e-6);
+        for energy in [
+            share(f64::NAN, 1.0),
+            share(1.0, f64::NAN),
+            share(f64::MAX, 1e-6),
+        ] {
+            assert!(!MeshError { energy, ..small }.is_finite());
         }
-        assert!(share(f64::NAN, 1.0).is_nan() && share(1.0, f64::NAN).is_nan());
+        assert!(share(1e-8, 1e-8).is_nan() && share(1e-15, 1e-15) == 0.0);
         assert!([1.0, f64::NAN, 2.0].into_iter().fold(0.0, larger).is_nan());
     }
 }

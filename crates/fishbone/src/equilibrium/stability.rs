@@ -88,19 +88,13 @@ pub(super) fn decide(
     let is_open = inertia.cost_free > 0 && is_stressed && inertia.negative == 0;
     match is_open {
         true => flat::decide(program, problem.tolerance(), &solution.at),
-        false if is_at_rest(program, &solution.at.point) => Some(Stability {
+        // Negative modes of a belt at rest are those of rounding.
+        false if program.is_at_rest(&solution.at.point) => Some(Stability {
             negative_modes: 0,
             ..inertia.into()
         }),
         false => Some(inertia.into()),
     }
-}
-
-/// Whether a shape has no energy, so that no motion lowers it: negative modes are those of rounding.
-fn is_at_rest(program: &BeltProgram, shape: &BeltPoint) -> bool {
-    /// Energy that is nothing but rounding, in mean R_f/U.
-    const NOTHING: f64 = 1e-20;
-    !program.is_loaded() && program.elastic_energy(&shape.fields) <= NOTHING
 }
 
 impl From<Inertia> for Stability {

@@ -139,19 +139,20 @@ struct Residuals {
 /// Estimated relative errors by the mesh; null where a quantity is not determined.
 #[derive(Debug, Clone, Serialize)]
 struct Error {
-    energy: f64,
+    energy: Option<f64>,
     position: Option<f64>,
-    force: f64,
-    radius: f64,
+    force: Option<f64>,
+    radius: Option<f64>,
 }
 
 impl Error {
     fn new(error: MeshError) -> Self {
+        let known = |error: f64| Some(error).filter(|error| !error.is_nan());
         Self {
-            energy: error.energy,
-            position: Some(error.position).filter(|error| !error.is_nan()),
-            force: error.force,
-            radius: error.radius,
+            energy: known(error.energy),
+            position: known(error.position),
+            force: known(error.force),
+            radius: known(error.radius),
         }
     }
 }

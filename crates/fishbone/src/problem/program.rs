@@ -168,6 +168,12 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         self
     }
 
+    /// Sum of weight and loads, world axes, in mean R_f/U².
+    pub(crate) fn total_force(&self) -> Vector3<f64> {
+        let forces = self.loads.iter().map(|load| load.load.force);
+        self.weight + forces.sum::<Vector3<f64>>()
+    }
+
     /// Sum of the sizes of weight, loads and moments, in mean R_f/U².
     pub(crate) fn total_load(&self) -> f64 {
         let forces = self.loads.iter().map(|load| load.load.force.norm());
@@ -370,6 +376,13 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
     pub(crate) fn is_loaded(&self) -> bool {
         let bears_moment = |support: &NodeSupport| support.hold.moment() != 0.0;
         !self.is_weightless() || !self.loads.is_empty() || self.supports.iter().any(bears_moment)
+    }
+
+    /// Whether nothing loads the belt and a shape has no energy: no motion lowers it, and it is a shape of any mesh.
+    pub(crate) fn is_at_rest(&self, shape: &BeltPoint<F>) -> bool {
+        /// Energy that is nothing but rounding, in mean R_f/U.
+        const NOTHING: f64 = 1e-20;
+        !self.is_loaded() && self.elastic_energy(&shape.fields) <= NOTHING
     }
 
     fn is_weightless(&self) -> bool {

@@ -5,13 +5,13 @@ use crate::analysis::family::{Along, Station};
 use crate::analysis::path::Path;
 use crate::equilibrium::{Equilibrium, Solved, from_guess};
 use crate::problem::Mesh;
-use stagewise::{Pace, Program};
+use stagewise::Pace;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-/// Whether a belt is flat and free of loads.
+/// Whether a belt lies without load and energy.
 fn is_at_rest(solved: &Solved) -> bool {
-    !solved.program.is_loaded() && solved.program.size(&solved.at.point) == 0.0
+    solved.program.is_at_rest(&solved.at.point)
 }
 
 /// The start of the branch that leaves a flat board at rest: a minimum a little on along the path, with the path on its mesh;
