@@ -165,17 +165,38 @@ def test_leaning_clamp_under_tension_bends_as_the_elastica(lean: float, pull: fl
     assert max(found.error) <= 1e-3
 
 
-def test_slender_belts_tend_to_a_limit() -> None:
+@pytest.mark.parametrize("energy", ["wunderlich", "sadowsky", "fishbone"])
+def test_slender_belts_tend_to_a_limit(energy: str) -> None:
     energies = []
-    for slenderness in (100.0, 300.0, 1000.0, 3000.0):
-        found = solve(quarter_twist(slenderness))
-        assert found.iterations < 1000
+    for slenderness in (100.0, 300.0, 1000.0, 3000.0, 10000.0):
+        found = solve(quarter_twist(slenderness) | {"energy": energy})
+        # However slender the belt is; the smooth ends of its ribs make the last steps of the least energies long.
+        assert found.iterations < 600
         assert found.error is not None
         assert max(found.error) <= 1e-3
         energies.append(found.energy)
     falls = -np.diff(energies)
     assert np.all(falls > 0.0)
-    assert np.all(falls[1:] < 0.6 * falls[:-1])
+    assert np.all(falls[1:] < 0.8 * falls[:-1])
+
+
+@pytest.mark.parametrize("energy", ["wunderlich", "sadowsky", "fishbone"])
+@pytest.mark.parametrize(
+    ("position", "rotation"),
+    [
+        ([0.4, 0.5, 0.2], [0.5, -0.4, 0.9]),
+        ([0.1, 0.6, -0.3], [-0.6, 1.1, 0.2]),
+        ([-0.2, 0.7, 0.1], [0.3, -1.2, -0.4]),
+    ],
+)
+def test_energy_of_a_slender_belt_is_off_its_limit_in_proportion_to_the_width(
+    energy: str, position: list[float], rotation: list[float]
+) -> None:
+    energies = [
+        solve(scenario(clamps(position, rotation), width=width, energy=energy)).energy for width in (4e-3, 2e-3, 5e-4)
+    ]
+    limit = 2.0 * energies[1] - energies[0]
+    assert energies[2] == pytest.approx(limit + 0.125 * (energies[0] - limit), rel=1e-3)
 
 
 def test_ends_drawn_past_each_other_are_carried_or_refused() -> None:

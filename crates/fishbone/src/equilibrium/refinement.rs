@@ -1,5 +1,7 @@
 //! The mesh that follows the error: short elements where the fields change fast, long ones where nothing happens.
 
+mod slender;
+
 use super::accuracy::Estimate;
 use super::active_set::settle;
 use super::search::{Search, prolong, prolonged};
@@ -7,6 +9,8 @@ use crate::problem::program::{BeltPoint, BeltProgram};
 use crate::problem::{Mesh, Problem};
 use crate::scenario::SAME_PLACE;
 use crate::strip::element::Element;
+use slender::narrowed;
+pub(super) use slender::{is_slender, mesh_about_ribs, mesh_for_ribs_anywhere, ribs_turn};
 use stagewise::{Distance, Outcome, Solution};
 use std::ops::ControlFlow;
 
@@ -20,6 +24,8 @@ const MOST: usize = 20_000;
 const MESHES: usize = 12;
 /// Greatest number of meshes that carry no equilibrium.
 const FAILURES: usize = 3;
+/// Turn of an element that is aimed at, in rad.
+const TURN: f64 = 0.3;
 /// Turn of an element beyond which its equations are no longer those of a belt unless a finer mesh has much the same
 /// solution, in rad.
 const MOST_TURN: f64 = 0.5;
@@ -27,8 +33,6 @@ const MOST_TURN: f64 = 0.5;
 const MOST_CONFIRMED_TURN: f64 = 1.5;
 /// Error beyond which an estimate tells no more than that the error is large, dimensionless.
 const LARGE: f64 = 0.05;
-/// Elements for each width V where ribs turn, a number: longer ones may settle on a false level.
-const PER_WIDTH: f64 = 8.0;
 
 /// A solution on a mesh.
 pub(super) struct Level {
@@ -124,9 +128,9 @@ fn first_level(
     if let Some(level) = loaded(problem, &rough, &mesh, proceed) {
         return (Some(level), mesh);
     }
-    match narrowed(problem, &rough, mesh.clone(), proceed) {
+    match narrowed(problem, &rough, &mesh, proceed) {
         Some(level) => {
-            let mesh = level.mesh_for_ribs(problem, 1.0);
+            let mesh = Mesh::of(problem, &level.program);
             (Some(level), mesh)
         }
         None => (None, mesh),
@@ -159,31 +163,6 @@ fn loaded(
     best
 }
 
-/// The minimum of a wider belt made narrower step by step, down to little wider than the belt; `None` of a belt that is not
-/// slender, or where this leads nowhere.
-///
-/// The ribs of a slender belt turn within a length of its width, at places that no mesh can know before. Those of a wider
-/// belt turn at nearly the same places, and less suddenly.
-fn narrowed(
-    problem: &Problem,
-    search: &Search,
-    mut mesh: Mesh,
-    proceed: &mut dyn FnMut() -> ControlFlow<()>,
-) -> Option<Level> {
-    /// Factor by which the belt is made narrower from one mesh to the next, dimensionless.
-    const NARROWER: f64 = 8.0;
-    let mut width = first_width(problem);
-    let mut best: Option<Level> = None;
-    while width > 1.0 {
-        let program = problem.program_on(&mesh)?.widened(width);
-        let level = Level::after(best, problem, search, program, proceed)?;
-        width = (width / NARROWER).max(1.0);
-        mesh = level.mesh_for_ribs(problem, width);
-        best = Some(level);
-    }
-    best
-}
-
 /// Elements of equal length, but shorter beside supports, links and loads: a tension T bends a belt there within √(R_f/T).
 fn first_mesh(problem: &Problem) -> Mesh {
     /// Length of an element in such a layer over the length √(R_f/T), with the sum of all loads for the tension.
@@ -195,86 +174,6 @@ fn first_mesh(problem: &Problem) -> Mesh {
     let lengths: Vec<f64> = program.elements().map(|(_, e)| e.length).collect();
     let places: Vec<_> = places.collect();
     Mesh::uniform(problem, FIRST).graded(problem, &lengths, &places)
-}
-
-/// Width of the belt that is solved first, over the belt's own; 1 of a belt that is not slender.
-fn first_width(problem: &Problem) -> f64 {
-    /// Width of a belt that is not slender, in U.
-    const WIDE: f64 = 0.05;
-    /// Greatest width over the length of a stretch, and over the radius of an arc, dimensionless.
-    const SHARE: f64 = 0.5;
-    let breaks = problem.break_points();
-    let stretches = breaks.windows(2).map(|ends| ends[1] - ends[0]);
-    let shortest = stretches.fold(f64::INFINITY, f64::min);
-    let program = problem.program(FIRST);
-    let radii = program.elements().map(|(_, e)| e.geodesic.abs().recip());
-    let least = radii.fold(shortest, f64::min);
-    (WIDE.min(SHARE * least) / width(problem)).max(1.0)
-}
-
-/// Whether a belt is so slender that its ribs turn within a small part of its length.
-pub(super) fn is_slender(problem: &Problem) -> bool {
-    first_width(problem) > 1.0
-}
-
-/// The mesh of a programme graded anew for a shape of its: fine where ribs turn, and so far about these places that they may
-/// move by as much as the width.
-pub(super) fn mesh_about_ribs(problem: &Problem, program: &BeltProgram, point: &BeltPoint) -> Mesh {
-    let width = width(problem);
-    mesh_for_ribs(problem, program, point, width / PER_WIDTH, width)
-}
-
-/// A mesh whose elements are short where the ribs of a shape turn and within a reach of there, in U.
-fn mesh_for_ribs(
-    problem: &Problem,
-    program: &BeltProgram,
-    point: &BeltPoint,
-    short: f64,
-    reach: f64,
-) -> Mesh {
-    let nodes = program.nodes();
-    let turning = program.elements();
-    let turning = turning.filter(|element| ribs_turn(point, *element));
-    let turning: Vec<_> = turning.map(|(k, _)| [nodes[k], nodes[k + 1]]).collect();
-    let is_near = |k: usize| {
-        let mut turning = turning.iter();
-        turning.any(|[from, to]| from - nodes[k + 1] < reach && nodes[k] - to < reach)
-    };
-    let elements = program.elements();
-    let lengths: Vec<f64> = elements
-        .map(
-            |(k, element)| match ribs_turn(point, (k, element)) || is_near(k) {
-                true => element.length.min(short),
-                false => element.length.max(LONGEST),
-            },
-        )
-        .collect();
-    Mesh::of(problem, program).graded(problem, &lengths, &[])
-}
-
-/// The mesh of a programme with elements split so that ribs may come to turn anywhere; `None` where it would have too many.
-pub(super) fn mesh_for_ribs_anywhere(problem: &Problem, program: &BeltProgram) -> Option<Mesh> {
-    /// Greatest number of elements.
-    const MOST: usize = 1000;
-    let short = width(problem) / PER_WIDTH;
-    let lengths = program.elements().map(|(_, e)| e.length.min(short));
-    let lengths: Vec<f64> = lengths.collect();
-    let mesh = Mesh::of(problem, program).graded(problem, &lengths, &[]);
-    (mesh.elements() <= MOST).then_some(mesh)
-}
-
-/// The width of a belt, in U.
-fn width(problem: &Problem) -> f64 {
-    problem.belt().width / problem.units().length
-}
-
-/// Whether the ribs of a shape turn fast in an element, as seen by its width.
-pub(super) fn ribs_turn(shape: &BeltPoint, (k, element): (usize, &Element)) -> bool {
-    /// Share of the greatest convergence 2/V from which ribs turn fast, dimensionless.
-    const FAST: f64 = 0.2;
-    let slopes = [k, k + 1].map(|node| shape.fields[node][1]);
-    let (_, convergence) = element.strips().middle(slopes);
-    convergence.abs() * element.half_width > FAST
 }
 
 impl Level {
@@ -345,13 +244,25 @@ impl Level {
         barrier: f64,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Self {
-        let solution = match near {
-            None => search.run(&program, None, proceed),
-            Some((known, shape)) => {
-                let shape = prolong(known, shape, &program);
-                search.only_from(&program, shape, barrier, proceed)
-            }
-        };
+        if let Some((known, shape)) = near {
+            let shape = prolong(known, shape, &program);
+            return Self::near(problem, search, program, shape, barrier, proceed);
+        }
+        let solution = search.run(&program, None, proceed);
+        let (solution, misfit) = settle(problem, search, &mut program, solution, proceed);
+        Self::new(program, solution, misfit)
+    }
+
+    /// The minimum that a search from a shape of a programme finds, with a first barrier; without an estimate.
+    fn near(
+        problem: &Problem,
+        search: &Search,
+        mut program: BeltProgram,
+        shape: BeltPoint,
+        barrier: f64,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Self {
+        let solution = search.only_from(&program, shape, barrier, proceed);
         let (solution, misfit) = settle(problem, search, &mut program, solution, proceed);
         Self::new(program, solution, misfit)
     }
@@ -489,12 +400,6 @@ impl Level {
         element.length * rate(k).max(rate(k + 1))
     }
 
-    /// A mesh for the ribs of the belt at another width, over its own.
-    fn mesh_for_ribs(&self, problem: &Problem, times: f64) -> Mesh {
-        let short = times * width(problem) / PER_WIDTH;
-        mesh_for_ribs(problem, &self.program, &self.solution.at.point, short, 0.0)
-    }
-
     /// A mesh on which the error should be within the accuracy. A belt that may slide along itself has no place on a graded
     /// mesh: there the elements are halved.
     fn better_mesh(&self, problem: &Problem) -> Mesh {
@@ -513,8 +418,6 @@ impl Level {
         const POWER: f64 = 3.0;
         /// Bounds of the change of a length from one mesh to the next, dimensionless.
         const CHANGE: [f64; 2] = [0.03, 2.0];
-        /// Turn of an element that is aimed at, in rad.
-        const TURN: f64 = 0.3;
         /// Share of the accuracy that is aimed at, dimensionless.
         const AIM: f64 = 0.5;
         /// Share of the largest curvature from which an element may have the tightest bend, dimensionless.
@@ -541,7 +444,7 @@ impl Level {
                     false => f64::INFINITY,
                 };
                 let by_ribs = match ribs_turn(&self.solution.at.point, (k, element)) {
-                    true => 2.0 * element.half_width / (PER_WIDTH * element.length),
+                    true => 2.0 * element.half_width / (slender::PER_WIDTH * element.length),
                     false => f64::INFINITY,
                 };
                 let factor = by_gain.min(by_turn).min(by_radius).min(by_ribs);

@@ -321,11 +321,21 @@ pub(super) fn prolong(from: &BeltProgram, point: &BeltPoint, to: &BeltProgram) -
 
 /// A shape prolonged to another mesh.
 pub(crate) fn prolonged(from: &BeltProgram, point: &BeltPoint, to: &BeltProgram) -> BeltPoint {
+    prolonged_by(from, point, to, &|u| u)
+}
+
+/// A shape prolonged to another mesh whose places are other ones of the shape, arc lengths in U; nodes at jumps keep theirs.
+pub(super) fn prolonged_by(
+    from: &BeltProgram,
+    point: &BeltPoint,
+    to: &BeltProgram,
+    own: &dyn Fn(f64) -> f64,
+) -> BeltPoint {
     let (nodes, known) = (to.nodes(), from.nodes());
     let after_joint = |k: usize| k > 0 && matches!(to.pieces[k - 1], Piece::Joint { .. });
     let places = nodes.iter().enumerate();
     let fields: Vec<_> = places
-        .map(|(k, u)| fields_at(from, &known, point, *u, after_joint(k)))
+        .map(|(k, u)| fields_at(from, &known, point, own(*u), after_joint(k)))
         .collect();
     let mut prolonged = BeltPoint {
         poses: vec![point.poses[0]; fields.len()],
