@@ -229,3 +229,11 @@ def test_error_does_not_depend_on_where_the_world_has_its_origin() -> None:
             errors.append(solve(tables | {"supports": moved}, elements=40).error)
         assert np.allclose(errors[0], errors[1], rtol=1e-3), errors
         assert errors[0].energy > 1e-8
+
+
+@pytest.mark.parametrize(("solver", "width", "distance"), [({"elements": 40}, 0.1, -0.9), ({}, 0.5, -0.97)])
+def test_only_a_fixed_mesh_is_advised_to_be_left_out(solver: dict[str, Any], width: float, distance: float) -> None:
+    tables = scenario(clamps([0.0, distance, 0.0], CLAMP), width=width, solver=solver)
+    found = fb.solve(fb.Scenario.from_dict(tables))
+    assert "no finer mesh confirms the shape" in found.message
+    assert ("leave out solver.elements" in found.message) == bool(solver)

@@ -132,12 +132,12 @@ struct Found {
     error: OnceLock<Option<MeshError>>,
 }
 
-impl From<Level> for (Found, Option<String>) {
+impl Found {
     /// The end of a search on a mesh, with the fault that keeps its result from being relied on.
-    fn from(level: Level) -> Self {
-        let fault = level.fault();
+    fn of(problem: &Problem, level: Level) -> (Self, Option<String>) {
+        let fault = level.fault(problem);
         let error = level.estimate.map(|estimate| Some(estimate.error));
-        let found = Found {
+        let found = Self {
             program: level.program,
             solution: level.solution,
             error: error.map_or_else(OnceLock::new, OnceLock::from),
@@ -198,7 +198,7 @@ fn find(
             Start::Near(..) | Start::Close(..) | Start::Downhill(..) => None,
         };
         if let Some(start) = start {
-            return refine(problem, &search, start, proceed).into();
+            return Found::of(problem, refine(problem, &search, start, proceed));
         }
     }
     let solution = match from {
@@ -227,7 +227,7 @@ fn find(
     if level.turns_too_far() {
         level.estimate(problem, Estimate::WILD, proceed);
     }
-    level.into()
+    Found::of(problem, level)
 }
 
 /// The supports and links whose constraints are redundant, by name; `None` where all are independent.

@@ -312,11 +312,15 @@ impl Level {
     }
 
     /// Why the solution cannot be relied on, though it has converged; `None` where it can.
-    pub(super) fn fault(&self) -> Option<String> {
+    pub(super) fn fault(&self, problem: &Problem) -> Option<String> {
+        let mesh = match problem.has_fixed_mesh() {
+            true => "leave out solver.elements, ",
+            false => "",
+        };
         let turned = (self.turns_too_far() && !self.is_confirmed()).then(|| {
             format!(
                 "elements turn by up to {:.1} rad, too far for the equations of a belt, and no finer mesh confirms the shape; \
-                 leave out solver.elements, move the supports apart, or lower the loads",
+                 {mesh}move the supports apart, or lower the loads",
                 self.turn()
             )
         });
