@@ -42,9 +42,9 @@ def output(*command):
 def kernels():
     """Arithmetic instructions of each function that is made for AVX, by the registers that they work on."""
     if sys.platform != "linux" or platform.machine() != "x86_64":
-        pytest.skip("instructions are known for x86_64 on Linux alone")
+        pytest.skip("x86-64 Linux only")
     if not (shutil.which("objdump") and shutil.which("readelf")):
-        pytest.skip("objdump and readelf are not installed; they are in binutils")
+        pytest.skip("objdump or readelf is missing: install binutils")
     starts = sorted(int(start, 16) for start in START.findall(output("readelf", "--debug-dump=frames", _core.__file__)))
     found = {}
     for line in ARITHMETIC.finditer(output("objdump", "-d", "--no-show-raw-insn", _core.__file__)):
@@ -72,4 +72,5 @@ def test_kernels_of_stages_work_on_several_numbers_at_a_time(kernels):
         share = numbers["scalar"] / sum(numbers.values())
         assert share < 0.25, counts
         odd += share >= 0.15
-    assert odd <= 2, kernels
+    # The elimination and the step of that programme; a third such kernel has lost its lanes.
+    assert odd == 2, kernels
