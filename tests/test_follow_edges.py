@@ -98,12 +98,12 @@ def test_a_path_of_numbers_has_no_angle(turned):
     assert "angle" not in turned.table()
 
 
-def test_a_taut_start_is_refused_in_words_of_the_scenario():
+def test_a_start_without_slack_is_refused_in_words_of_the_scenario():
     tables = fb.load(ROOT / "scenarios" / "planar.toml").to_dict()
     tables["supports"][1]["position"] = [0.0, 1.0, 0.0]
     with pytest.raises(fb.NoBranch, match="without slack") as caught:
         fb.follow(fb.Scenario.from_dict(tables), {"supports[1].position[1]": 0.9})
-    assert caught.value.reason == "taut"
+    assert caught.value.reason == "no_slack"
     assert "\n" not in str(caught.value)
 
 

@@ -72,7 +72,7 @@ class NoMargin(FishboneError):  # noqa: N818
         Literal[
             "no_multipliers",
             "not_converged",
-            "taut",
+            "no_slack",
             "flat",
             "singular",
             "not_stable",
@@ -138,7 +138,7 @@ class NoPath(FishboneError, ValueError):  # noqa: N818
 class NoBranch(FishboneError):  # noqa: N818
     """There is no equilibrium to follow, or more than one branch continues it."""
 
-    reason: Literal["no_multipliers", "not_converged", "taut", "flat", "singular"] | None = None
+    reason: Literal["no_multipliers", "not_converged", "no_slack", "flat", "singular"] | None = None
     """The reason: the source's method has no multipliers; the solve has not converged; the supports leave no slack; the
     belt is flat and may leave its plane in many ways; or the equilibrium is singular, so that no single branch
     continues it."""

@@ -127,9 +127,9 @@ class Branch:
         self.end: End = inner.end(index)
         """The reason of the end of the branch: the path ends ("range"); the branch meets another branch head on
         ("event"), or its own start ("closed"); the belt loses its stability there and goes on elsewhere ("unstable");
-        the belt is drawn straight and has no slack left ("taut"); the ribs beside a bend come to other edges, with
-        which no equilibrium is found ("edges"); the `states` of `follow` are used up ("budget"); or no step, however
-        short, converges ("lost")."""
+        the belt has no slack left ("no_slack"); the ribs beside a bend come to other edges, with which no equilibrium
+        is found ("edges"); the `states` of `follow` are used up ("budget"); or no step, however short, converges
+        ("lost")."""
         self.events: list[Event] = [_event(*event) for event in inner.events(index)]
         """The events of the branch in order."""
 

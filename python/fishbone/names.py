@@ -21,5 +21,5 @@ Motion: TypeAlias = Literal["straight", "screw"]
 """The motion of a support from one pose to the next."""
 Kind: TypeAlias = Literal["fold", "pitchfork", "transcritical", "bifurcation", "edges"]
 """The kind of an event on a branch."""
-End: TypeAlias = Literal["range", "event", "closed", "unstable", "budget", "lost", "edges", "taut"]
-"""The reason of the end of a branch; "taut": the belt is drawn straight and has no slack left."""
+End: TypeAlias = Literal["range", "event", "closed", "unstable", "budget", "lost", "edges", "no_slack"]
+"""The reason of the end of a branch; "no_slack": the belt is held straight and has none left."""

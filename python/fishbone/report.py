@@ -24,7 +24,7 @@ ENDS: dict[End, str] = {
     "closed": "ends where it began",
     "budget": "has used up its states before the end of the path",
     "lost": "ends where no step, however short, leads on",
-    "taut": "ends where the belt is drawn straight",
+    "no_slack": "ends where the belt has no slack left",
     "unstable": "ends where the belt snaps",
     "edges": "ends where ribs beside a bend come to other edges of the board, and no equilibrium is found with these",
 }

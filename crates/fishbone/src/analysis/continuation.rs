@@ -39,7 +39,7 @@ named! {
         /// The active edges change at a bend of the board.
         Edges = "edges",
         /// The belt is at its inextensible limit.
-        Taut = "taut",
+        NoSlack = "no_slack",
         /// The caller asked to end.
         Interrupted = "interrupted",
     }
@@ -71,7 +71,7 @@ pub enum NoBranch {
         "the supports hold the belt straight, without slack, so that there is no shape to follow: move the supports a little \
          closer together, or begin at the other end of the path"
     )]
-    Taut,
+    NoSlack,
     /// The belt is flat, and has no single continuation.
     #[error(
         "the belt lies flat at the start of the path, where its ribs may turn at no cost of energy, so that it may leave the \
@@ -86,7 +86,7 @@ pub enum NoBranch {
 }
 
 named!(impl NoBranch {
-    Taut = "taut",
+    NoSlack = "no_slack",
     Flat = "flat",
     Singular = "singular",
     ..Uncertified,
@@ -283,7 +283,7 @@ pub fn follow(
 ) -> Result<Diagram, NoBranch> {
     equilibrium.certified()?;
     if path.base().has_no_slack() {
-        return Err(NoBranch::Taut);
+        return Err(NoBranch::NoSlack);
     }
     let suited = equilibrium.for_paths(&mut || proceed(0, 0.0));
     let equilibrium = suited.as_ref().unwrap_or(equilibrium);

@@ -454,7 +454,7 @@ fn without_mirror_image(last: &mut Stretch, end: End) -> End {
         return end;
     }
     last.events.retain(|(_, event)| event.turn != Turn::Apex);
-    End::Taut
+    End::NoSlack
 }
 
 /// The last station at a distance of at least `far` before an event, else the first.
