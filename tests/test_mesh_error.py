@@ -10,6 +10,7 @@ import pytest
 from scipy.optimize import brentq
 
 import fishbone as fb
+from conftest import ROOT
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -237,3 +238,27 @@ def test_only_a_fixed_mesh_is_advised_to_be_left_out(solver: dict[str, Any], wid
     found = fb.solve(fb.Scenario.from_dict(tables))
     assert "no finer mesh confirms the shape" in found.message
     assert ("leave out solver.elements" in found.message) == bool(solver)
+
+
+def hinge(tolerance: float, elements: int | None) -> fb.Equilibrium:
+    tables = fb.load(ROOT / "scenarios" / "hinge.toml").to_dict()
+    tables["solver"] |= {"tolerance": tolerance, "elements": elements}
+    tables["solver"] = {key: value for key, value in tables["solver"].items() if value is not None}
+    return fb.solve(fb.Scenario.from_dict(tables))
+
+
+@pytest.mark.parametrize("elements", [200, None])
+def test_a_lower_tolerance_leaves_the_mesh_and_the_estimate_as_they_are(elements: int | None) -> None:
+    coarse, fine = hinge(1e-8, elements), hinge(1e-12, elements)
+    np.testing.assert_array_equal(fine.u, coarse.u)
+    assert fine.status == "converged"
+    assert max(fine.residuals) <= 1e-12
+    assert fine.energy == pytest.approx(coarse.energy, rel=1e-8)
+    np.testing.assert_allclose(fine.error, coarse.error, rtol=1e-3)
+
+
+def test_a_tolerance_below_rounding_is_named() -> None:
+    found = hinge(1e-13, 1000)
+    assert found.status == "not_converged"
+    assert found.message.startswith("solver.tolerance, 1.0e-13, is below what rounding leaves")
+    assert found.energy == pytest.approx(hinge(1e-8, 1000).energy, rel=1e-8)

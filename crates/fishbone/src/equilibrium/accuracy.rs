@@ -114,7 +114,7 @@ impl Estimate {
             let error = own.off_on(problem, &fine, &same);
             return Some(Self::at_rest(error, program.elements().count()));
         }
-        let step = stagewise::correct(&fine, problem.tolerance(), near.clone())?;
+        let step = stagewise::correct(&fine, tolerance(problem), near.clone())?;
         let mut better = (step.point, step.equalities, step.objective);
         let mut error = own.off_on(problem, &fine, &better);
         // A density that does not know the width lets ribs turn over anywhere at no cost, and one step does not move the
@@ -179,6 +179,13 @@ fn parts(program: &BeltProgram, at: &BeltPoint) -> Vec<usize> {
     program.elements().map(parts).collect()
 }
 
+/// Tolerance of an equilibrium that another is only compared with: a lower one of the problem may be below rounding.
+fn tolerance(problem: &Problem) -> f64 {
+    /// Residual that hardly changes an estimate, lengths in U and energy in mean R_f/U.
+    const CLOSE: f64 = 1e-8;
+    problem.tolerance().max(CLOSE)
+}
+
 /// The equilibrium of a programme near to a point: by Newton's method, else the minimum that a search from there finds.
 fn solved_near(
     problem: &Problem,
@@ -186,7 +193,7 @@ fn solved_near(
     near: &Stationary<BeltPoint>,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Option<Solution<BeltPoint>> {
-    stagewise::settle(program, problem.tolerance(), near.clone())
+    stagewise::settle(program, tolerance(problem), near.clone())
         .or_else(|| searched_near(problem, program, &near.point, proceed))
 }
 
@@ -197,7 +204,10 @@ fn searched_near(
     near: &BeltPoint,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Option<Solution<BeltPoint>> {
-    let search = Search::of(problem);
+    let search = Search {
+        tolerance: tolerance(problem),
+        ..Search::of(problem)
+    };
     let barrier = search.settings.warm_barrier;
     let found = search.only_from(program, near.clone(), barrier, proceed);
     (found.outcome == Outcome::Converged).then_some(found)

@@ -2,7 +2,7 @@
 
 use super::accuracy::{Estimate, MeshError};
 use super::active_set::settle;
-use super::refinement::{Level, refine};
+use super::refinement::{Level, ROUNDING, refine};
 use super::search::{MinimumSettings, Search, is_flat_under_load};
 use super::stability::{self, Stability};
 use super::{Equilibrium, LinkForce, Reaction, Solved, Start, Status, winding};
@@ -285,6 +285,13 @@ fn judge(
                 ),
             )
         }
+        Outcome::IterationLimit | Outcome::Stalled if largest <= ROUNDING => (
+            Status::NotConverged,
+            format!(
+                "solver.tolerance, {tolerance:.1e}, is below what rounding leaves, {largest:.1e}: the shape is as near to an \
+                 equilibrium as numbers of 64 bits allow; give a tolerance of {ROUNDING:.0e} or more"
+            ),
+        ),
         Outcome::IterationLimit => (
             Status::NotConverged,
             format!(

@@ -34,6 +34,9 @@ const MOST_CONFIRMED_TURN: f64 = 1.5;
 /// Error beyond which an estimate tells no more than that the error is large, dimensionless.
 const LARGE: f64 = 0.05;
 
+/// Residual that rounding may leave on some mesh, lengths in U and energy in mean R_f/U.
+pub(super) const ROUNDING: f64 = 1e-10;
+
 /// A solution on a mesh.
 pub(super) struct Level {
     pub(super) program: BeltProgram,
@@ -56,6 +59,10 @@ pub(super) fn refine(
         Some((program, ..)) => (None, Mesh::of(problem, program)),
         None => first_level(problem, search, proceed),
     };
+    let above_rounding = Search {
+        tolerance: search.tolerance.max(ROUNDING),
+        ..*search
+    };
     let mut iterations = best.as_ref().map_or(0, |level| level.solution.iterations);
     let mut failures = 0;
     for _ in 0..MESHES {
@@ -64,7 +71,7 @@ pub(super) fn refine(
         };
         let sound = best.as_ref().filter(|best| best.is_sound());
         let mut level = match sound {
-            Some(best) => best.on_finer(problem, search, program, proceed),
+            Some(best) => best.on_finer(problem, &above_rounding, program, proceed),
             None => {
                 let barrier = search.settings.cold_barrier;
                 let barrier = start.map_or(barrier, |(_, _, barrier)| barrier);
@@ -72,7 +79,7 @@ pub(super) fn refine(
                 let search = if near.is_none() {
                     rough(search)
                 } else {
-                    *search
+                    above_rounding
                 };
                 Level::on(problem, &search, program, near, barrier, proceed)
             }
@@ -81,9 +88,15 @@ pub(super) fn refine(
         level.estimate(problem, f64::INFINITY, proceed);
         iterations += level.solution.iterations;
         level.solution.iterations = iterations;
-        let is_done = level.is_accurate(problem.accuracy()) && level.is_precise(search.tolerance);
-        if level.solution.outcome == Outcome::Interrupted || is_done {
+        let is_done =
+            level.is_accurate(problem.accuracy()) && level.is_precise(above_rounding.tolerance);
+        let is_precise = level.is_precise(search.tolerance);
+        if level.solution.outcome == Outcome::Interrupted || (is_done && is_precise) {
             return level;
+        }
+        if is_done {
+            best = Some(level);
+            break;
         }
         failures += usize::from(!level.is_sound());
         let in_vain = best
@@ -220,7 +233,7 @@ impl Level {
         let program = self.program.clone();
         let mut level = Self::on(problem, search, program, Some(own), barrier, proceed);
         level.solution.iterations += self.solution.iterations;
-        if level.has_converged() {
+        if level.has_converged() || level.solution.residuals.largest() <= ROUNDING {
             return level;
         }
         let barrier = search.settings.cold_barrier;
