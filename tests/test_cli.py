@@ -4,13 +4,14 @@ import os
 import re
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import fishbone as fb
-from fishbone import cli, examples, files, plot, report
+from fishbone import cli, examples, files, plot, progress, report
 
 
 @pytest.fixture
@@ -336,8 +337,8 @@ def searches(monkeypatch, arches):
 
     def branches(scenario, *, progress):
         searches.append(progress)
-        if progress is not None:
-            progress(1, 2)
+        progress(1, 2)
+        time.sleep(0.3)
         return arches
 
     monkeypatch.setattr(fb, "branches", branches)
@@ -425,14 +426,28 @@ def test_all_passes_every_warning_on_once(run, monkeypatch, example):
     assert_one_line(err, "coarse.json", "warning", "80")
 
 
-def test_all_shows_its_progress_on_a_terminal_only(run, monkeypatch, planar_file, searches):
+def test_all_shows_its_progress_once_it_takes_long(run, monkeypatch, planar_file, searches):
     assert run("solve", planar_file, "--all")[2] == ""
+    monkeypatch.setattr(progress, "QUIET", 0.05)
+    monkeypatch.setattr(progress, "QUIET_IN_LOGS", 0.1)
+    lines = run("solve", planar_file, "--all")[2].splitlines()
+    assert "fishbone: searching, 50%, after 0 s" in lines
     monkeypatch.setenv("FORCE_COLOR", "1")
     err = run("solve", planar_file, "--all")[2]
     assert "searching" in err
     assert "50%" in err
-    assert searches[0] is None
-    assert searches[1] is not None
+
+
+def test_a_solve_shows_that_it_goes_on(run, monkeypatch, planar_file):
+    """Without any word from the core, as of a mesh of 100 000 elements."""
+    solve = fb.solve
+    monkeypatch.setattr(fb, "solve", lambda scenario: (time.sleep(0.4), solve(scenario))[1])
+    monkeypatch.setattr(progress, "QUIET_IN_LOGS", 0.1)
+    code, _, err = run("solve", planar_file)
+    lines = [line for line in err.splitlines() if "solving" in line]
+    assert code == 0
+    # After 0.1 s, and after twice the time from then on.
+    assert 2 <= len(lines) <= 3
 
 
 def test_control_c_ends_all_with_exit_130_and_one_line(planar_file, tmp_path):
@@ -475,9 +490,87 @@ def test_follow_prints_that_there_are_no_events(run, planar_file):
 
 
 def test_follow_prints_where_a_branch_ends_short_of_the_path(run, planar_file):
-    code, out, _ = run("follow", planar_file, *TURN, "--states", "10")
-    assert code == 0
+    outputs = ("--out", "a.json", "--table", "a.csv", "--figure", "a.png")
+    code, out, err = run("follow", planar_file, *TURN, "--states", "10", *outputs)
+    assert code == 3
     assert "branch 0 has used up its states" in out
+    assert_one_line(err, planar_file, "is followed to -0.49", "of -1.5", "branch 0 has used up its states", "--states")
+    diagram = json.loads(Path("a.json").read_text("utf-8"))
+    assert diagram["goal"] == -1.5
+    assert diagram["reached"] == diagram["branches"][0]["states"][-1]["parameter"]
+    assert sorted(path.name for path in Path().iterdir()) == ["a.csv", "a.json", "a.png"]
+
+
+def test_follow_is_complete_at_the_end_of_the_path_and_where_a_branch_has_turned_back(run, planar_file, turned):
+    assert turned.is_complete
+    assert turned.reached == turned.branches[0].parameter.min() > turned.goal
+    code, _, err = run("follow", planar_file, *TURN, "--snaps", "--branches", "1")
+    assert code == 3
+    assert_one_line(err, "of -1.5", "branch 0 ends where the belt snaps", "--branches")
+    assert run("follow", planar_file, *TURN, "--snaps")[0] == 0
+
+
+def test_follow_says_how_many_events_it_leaves_out(turned):
+    [branch] = turned.branches
+    unconfirmed = [event._replace(confirmed=False) for event in branch.events] * 2
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(branch, "events", [*unconfirmed, *branch.events])
+        patch.setattr(branch, "end", "lost")
+        assert "2 of 3 events are left out" in report.shortfall(turned)
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        ("--to", "supports[1].position[1]=3"),
+        ("--pose", "0 0.7 0 0 0 0", "--pose", "0 3 0 0 0 0", "--pose", "0 0.7 0 0 0 0"),
+    ],
+)
+def test_a_path_out_of_reach_is_exit_3_at_once(run, monkeypatch, planar_file, path):
+    monkeypatch.setattr(fb, "follow", lambda *_, **__: pytest.fail("followed"))
+    code, out, err = run("follow", planar_file, *path, "--out", "a.json")
+    assert (code, out) == (3, "")
+    assert_one_line(err, planar_file, "infeasible", "2 more than the belt between them (1)")
+    assert list(Path().iterdir()) == []
+
+
+def test_a_snap_has_a_row_with_its_size_in_both_tables(run, planar_file, turned):
+    code, out, _ = run("follow", planar_file, *TURN, "--snaps", "--table", "a.csv")
+    assert code == 0
+    [fold] = turned.branches[0].events
+    shown = [line.split() for line in out.splitlines() if " snap " in line]
+    sizes = [report.number(size) for size in (fold.snapped.energy, fold.jump, fold.released)]
+    assert shown == [["0", "snap", report.number(fold.snapped_parameter), *sizes]]
+    with Path("a.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    [place] = [index for index, row in enumerate(rows) if row["event"] == "snap"]
+    before, snap, after = rows[place - 1 : place + 2]
+    assert (before["event"], before["branch"], snap["branch"], after["branch"]) == ("fold", "0", "0", "1")
+    assert float(snap["jump"]) == pytest.approx(fold.jump, rel=1e-6)
+    assert float(snap["released"]) == pytest.approx(float(before["energy"]) - float(snap["energy"]), rel=1e-3)
+    for name in ("energy", "height", "supports[1].force.y", "supports[1].moment.z", "bend_radius.p99"):
+        assert float(snap[name]) == pytest.approx(float(after[name]), rel=0.01)
+    assert {row["jump"] for row in rows if row is not snap} == {"nan"}
+
+
+@pytest.mark.parametrize("limit", ["0", "-1", "nan", "inf"])
+def test_a_limit_that_is_no_radius_is_exit_2_before_any_solve(run, monkeypatch, planar_file, limit):
+    monkeypatch.setitem(fb.follow.__globals__, "solve", lambda _: pytest.fail("solved"))
+    code, out, err = run("follow", planar_file, *TURN, "--radius-limit", limit)
+    assert (code, out) == (2, "")
+    assert_one_line(err, "--radius-limit: found", limit)
+
+
+def test_follow_says_where_the_radius_is_below_its_limit_with_or_without_a_figure(run, planar_file, turned):
+    [branch] = turned.branches
+    radius, places = branch.least_spine_radius, branch.parameter
+    least = report.number(radius.min())
+    code, _, err = run("follow", planar_file, *TURN, "--radius-limit", "0.1")
+    broken = [report.number(edge(places[radius < 0.1])) for edge in (np.min, np.max)]
+    assert code == 0
+    where = f"tighter than the limit of 0.1 between {broken[0]} and {broken[1]}: the least radius is {least} at "
+    assert_one_line(err, "warning", where + report.number(places[radius.argmin()]))
+    assert_one_line(run("follow", planar_file, *TURN, "--radius-limit", "0.01")[2], f"the least radius is {least}")
 
 
 def test_follow_writes_all_outputs_and_nothing_else(run, planar_file, turned):
@@ -605,20 +698,21 @@ def test_follow_misses_matplotlib_before_the_solve(run, monkeypatch, planar_file
     assert_one_line(err, "matplotlib", "pip install")
 
 
-def test_follow_shows_its_progress_on_a_terminal_only(run, monkeypatch, planar_file):
-    calls = []
+def test_follow_shows_its_progress_once_it_takes_long(run, monkeypatch, planar_file):
     follow = fb.follow
 
-    def spy(*arguments, progress, **settings):
-        calls.append(progress)
-        return follow(*arguments, progress=progress, **settings)
+    def slow(*arguments, progress, **settings):
+        def show(branch, share):
+            progress(branch, share)
+            time.sleep(0.01)
 
-    monkeypatch.setattr(fb, "follow", spy)
+        return follow(*arguments, progress=show, **settings)
+
+    monkeypatch.setattr(fb, "follow", slow)
     assert run("follow", planar_file, *TURN)[2] == ""
     monkeypatch.setenv("FORCE_COLOR", "1")
-    assert "branch 0" in run("follow", planar_file, *TURN)[2]
-    assert calls[0] is None
-    assert calls[1] is not None
+    monkeypatch.setattr(progress, "QUIET", 0.05)
+    assert "following branch 0" in run("follow", planar_file, *TURN)[2]
 
 
 def test_control_c_ends_follow_with_exit_130_and_one_line(planar_file, tmp_path):

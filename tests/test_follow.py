@@ -255,6 +255,7 @@ def test_reports_are_those_of_the_equilibria(sheared):
         assert branch.least_bend_radius[state] == shape.least_bend_radius.value
         assert branch.least_spine_radius[state] == shape.least_spine_radius.value
         assert branch.rib_margin[state] == shape.rib_margin.value
+        assert tuple(branch.area_radii[state]) == shape.bend_radius.area
         np.testing.assert_array_equal(branch.position[state], shape.position)
         for support in ("start", "end"):
             for along, at in zip(branch.reaction(support), shape.reaction(support), strict=True):

@@ -34,6 +34,8 @@ class Scenario:
     def from_toml(text: str, file: str | None = None) -> Scenario: ...
     @staticmethod
     def from_json(text: str, file: str | None = None) -> Scenario: ...
+    @property
+    def is_in_si_units(self) -> bool: ...
     def to_json(self) -> str: ...
 
 @final
@@ -133,6 +135,9 @@ class Path:
     def numbers(scenario: Scenario, changes: list[tuple[str, float]]) -> Path: ...
     @staticmethod
     def poses(scenario: Scenario, support: int, poses: list[tuple[_Row, _Row]], motion: Motion) -> Path: ...
+    @property
+    def goal(self) -> float: ...
+    def out_of_reach(self) -> tuple[float, str] | None: ...
 
 @final
 class Diagram:
@@ -157,6 +162,7 @@ class Diagram:
         _Floats,
         _Floats,
         _Floats,
+        list[_Floats],
         _Floats,
         list[bool | None],
         list[Status],

@@ -6,6 +6,7 @@ import contextlib
 import csv
 import io
 import json
+import math
 from itertools import compress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,9 +17,11 @@ import fishbone
 from fishbone import examples as shipped
 from fishbone.errors import FishboneError, NoBranch
 from fishbone.files import check_writable, write_whole
+from fishbone.follow import out_of_reach
+from fishbone.progress import progress
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from rich.console import Console
 
@@ -121,17 +124,18 @@ def solve(  # noqa: PLR0913 - one for each option
     pictures = _pictures(figure, mesh)
     _spare(file, out)
     scenario = fishbone.load(file)
-    found = _all(scenario) if is_all else [fishbone.solve(scenario)]
+    found = _all(scenario) if is_all else [_solved(scenario)]
     converged = [equilibrium for equilibrium in found if equilibrium.status == "converged"]
     # All contents are made before a file is written, so that a failure leaves no file behind.
     contents = {}
-    text = _encode_found(found, is_all=is_all) if as_json or out is not None else ""
-    if out is not None:
-        contents[out] = text.encode()
-    if converged:
-        subject = converged if is_all else converged[0]
-        contents |= {path: encode_picture(subject, path.suffix) for path, encode_picture in pictures}
-    _write_all(contents)
+    with progress("writing"):
+        text = _encode_found(found, is_all=is_all) if as_json or out is not None else ""
+        if out is not None:
+            contents[out] = text.encode()
+        if converged:
+            subject = converged if is_all else converged[0]
+            contents |= {path: encode_picture(subject, path.suffix) for path, encode_picture in pictures}
+        _write_all(contents)
     if as_json:
         click.echo(text, nl=False)
     if not converged:
@@ -141,9 +145,16 @@ def solve(  # noqa: PLR0913 - one for each option
     _warn(file, converged)
 
 
+def _solved(scenario: fishbone.Scenario) -> Equilibrium:
+    with progress("solving"):
+        return fishbone.solve(scenario)
+
+
 def _all(scenario: fishbone.Scenario) -> list[Equilibrium]:
-    with _progress(lambda done, planned: ("searching", done, max(planned, 1))) as progress:
-        return fishbone.branches(scenario, progress=progress)
+    with progress("searching") as state:
+        return fishbone.branches(
+            scenario, progress=lambda done, planned: state.show("searching", done / max(planned, 1))
+        )
 
 
 def _spare(file: Path, out: Path | None) -> None:
@@ -255,7 +266,12 @@ def _warn(file: Path, equilibria: list[Equilibrium]) -> None:
     callback=_output(".png", ".pdf", ".svg"),
     help="Draw energy, height and force along the path: .png, .pdf or .svg.",
 )
-@click.option("--radius-limit", type=float, metavar="R", help="Draw a line at this bend radius into --figure.")
+@click.option(
+    "--radius-limit",
+    type=float,
+    metavar="R",
+    help="Say where the bend on the spine is tighter than this radius, and draw a line into --figure.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print all states as JSON instead of tables.")
 def follow(  # noqa: PLR0913 - one for each option
     file: Path,
@@ -279,41 +295,74 @@ def follow(  # noqa: PLR0913 - one for each option
     FILE is .toml or .json. The path changes numbers of the scenario (--to), or leads a support through poses (--pose).
     Branches are followed through folds and instabilities; tables of branches and events are printed.
 
-    Exit code: 0 followed, 2 invalid input, 3 no equilibrium to begin with.
+    Exit code: 0 followed, 2 invalid input, 3 no equilibrium to begin with, or the path is not followed to its end.
     """
     path = _path_of(numbers, poses, support, screw=screw)
-    if figure is not None:
-        from fishbone import plot  # noqa: PLC0415
+    if radius_limit is not None and not 0.0 < radius_limit < math.inf:
+        raise Invalid(f"--radius-limit: found {radius_limit:g}, allowed a positive finite number")
+    pictures = _pictures(figure, None)
     _spare(file, out)
     scenario = fishbone.load(file)
-    try:
-        with _progress(lambda branch, share: (f"branch {branch}", share, 1.0)) as progress:
-            diagram = fishbone.follow(
-                scenario, path, step=step, states=states, branches=branches, snaps=snaps, progress=progress
-            )
-    except NoBranch as error:
-        raise NoEquilibrium(f"{file}: {' '.join(str(error).split())}") from error
-    with _progress(lambda branch, count: ("reporting", branch, max(count, 1))) as progress:
-        for index, branch in enumerate(diagram.branches):
-            if progress is not None:
-                progress(index, len(diagram.branches))
-            # The branch computes and keeps its quantities at the first access.
-            _ = branch.energy
+    diagram = _followed(file, scenario, path, {"step": step, "states": states, "branches": branches, "snaps": snaps})
     # All contents are made before a file is written, so that a failure leaves no file behind.
     contents = {}
-    text = encode(diagram.to_dict()) if as_json or out is not None else ""
-    if out is not None:
-        contents[out] = text.encode()
-    if table is not None:
-        contents[table] = encode_table(diagram.table())
-    if figure is not None:
+    with progress("writing"):
+        text = encode(diagram.to_dict()) if as_json or out is not None else ""
+        if out is not None:
+            contents[out] = text.encode()
+        if table is not None:
+            contents[table] = encode_table(diagram.table())
         limit = {} if radius_limit is None else {"radius_limit": radius_limit}
-        contents[figure] = plot.encode(diagram, figure.suffix, **limit)
-    _write_all(contents)
+        contents |= {path: encode_picture(diagram, path.suffix, **limit) for path, encode_picture in pictures}
+        _write_all(contents)
     if as_json:
         click.echo(text, nl=False)
     else:
         _print_diagram(diagram)
+    if radius_limit is not None:
+        _compare_radius(file, diagram, radius_limit)
+    if not diagram.is_complete:
+        raise NoEquilibrium(f"{file}: {_shortfall(diagram)}")
+
+
+def _followed(
+    file: Path, scenario: fishbone.Scenario, path: dict[str, Any] | fishbone.Poses, settings: dict[str, Any]
+) -> Diagram:
+    """The diagram of a path, with the quantities of its states."""
+    try:
+        with progress("solving") as state:
+            # Of numbers, an invalid path is refused before a long solve.
+            start = fishbone.solve(scenario) if isinstance(path, fishbone.Poses) else scenario
+            obstacle = out_of_reach(start, path)
+            if obstacle is not None:
+                raise NoEquilibrium(f"{file}: infeasible: {obstacle}")
+
+            def show(branch: int, share: float) -> None:
+                state.show(f"following branch {branch}", share)
+
+            diagram = fishbone.follow(start, path, **settings, progress=show)
+    except NoBranch as error:
+        raise NoEquilibrium(f"{file}: {' '.join(str(error).split())}") from error
+    with progress("reporting") as state:
+        for index, branch in enumerate(diagram.branches):
+            state.show("reporting", index / len(diagram.branches))
+            # The branch computes and keeps its quantities at the first access.
+            _ = branch.energy
+    return diagram
+
+
+def _compare_radius(file: Path, diagram: Diagram, limit: float) -> None:
+    """Prints where the belt is bent to less than a radius on its spine, or that it is nowhere."""
+    from fishbone.report import below_limit  # noqa: PLC0415
+
+    click.echo(f"fishbone: {file}: {below_limit(diagram, limit)}", err=True)
+
+
+def _shortfall(diagram: Diagram) -> str:
+    """Where and why a path is not followed to its end."""
+    from fishbone.report import shortfall  # noqa: PLC0415
+
+    return shortfall(diagram)
 
 
 def _path_of(
@@ -366,30 +415,6 @@ def _place(text: str) -> Place:
         with contextlib.suppress(ValueError):
             return kind(text)
     raise Invalid(f'--support: found {text!r}, allowed "start", "end", an index or an arc length')
-
-
-@contextlib.contextmanager
-def _progress(
-    read: Callable[[int, float], tuple[str, float, float]],
-) -> Iterator[Callable[[int, float], object] | None]:
-    """A progress bar on a terminal, else None; `read` turns the arguments of a call into text, done and total."""
-    from rich.console import Console  # noqa: PLC0415
-
-    console = Console(stderr=True)
-    if not console.is_terminal:
-        yield None
-        return
-    from rich.progress import Progress  # noqa: PLC0415
-
-    with Progress(console=console, transient=True) as bar:
-        task = bar.add_task("", total=None)
-
-        def show(count: int, amount: float) -> None:
-            words, done, planned = read(count, amount)
-            bar.update(task, description=words, completed=done, total=planned)
-
-        show(0, 0.0)
-        yield show
 
 
 def encode_table(columns: Columns) -> bytes:

@@ -14,7 +14,7 @@ import numpy as np
 from fishbone import _core
 from fishbone.equilibrium import Equilibrium, Reaction, solve
 from fishbone.errors import InvalidArgument
-from fishbone.names import Motion
+from fishbone.names import Kind, Motion
 from fishbone.scenario import Scenario
 from fishbone.tracker import triple
 
@@ -24,12 +24,16 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     from numpy.typing import NDArray
 
-    from fishbone.names import End, Kind, Place, Status
+    from fishbone.names import End, Place, Status
 
     Floats = NDArray[np.float64]
     Columns = dict[str, NDArray[Any]]
 
 SCHEMA = "fishbone.diagram/1"
+SNAP = "snap"
+"""The event in the row of a table that holds the minimum after a snap."""
+QUANTILES = ("bend_radius.p999", "bend_radius.p99", "bend_radius.p95")
+"""The columns of the radii exceeded on 99.9, 99 and 95 % of the area."""
 MAX_STEP = 1.0
 MIN_STATES, MAX_STATES = 2, 100_000
 MAX_BRANCHES = 1000
@@ -102,6 +106,7 @@ class _Report(NamedTuple):
     moment: Floats
     least_bend_radius: Floats
     least_spine_radius: Floats
+    area_radii: list[Floats]
     rib_margin: Floats
     stable: list[bool | None]
     status: list[Status]
@@ -207,6 +212,14 @@ class Branch:
         return self._report.least_spine_radius.copy()
 
     @property
+    def area_radii(self) -> Floats:
+        """The bend radii exceeded on 99.9, 99 and 95 % of the board's area; infinite where it is flat.
+
+        Shapes: (m, 3).
+        """
+        return np.column_stack(self._report.area_radii)
+
+    @property
     def rib_margin(self) -> Floats:
         """The least slack of the rib bound; ribs cross inside the belt where it is negative.
 
@@ -262,19 +275,19 @@ class Diagram:
         self,
         inner: _core.Diagram,
         start: Equilibrium,
-        parameter_name: str,
-        support: int | None,
-        angles: Floats | None = None,
+        way: _Way,
     ) -> None:
         self.start = start
         """The equilibrium at the start of the path."""
-        self.parameter_name = parameter_name
+        self.parameter_name = way.parameter_name
         """The name of `parameter`: the field where one number changes; "share of the path", 0 to 1, where several
         change; for poses "place on the path", 0 at the first pose of the support and 1, 2, … at the poses given."""
+        self.goal = way.inner.goal
+        """The parameter at the end of the path."""
         last = len(start._inner.reactions) - 1  # noqa: SLF001 - of this package
-        self.support = support if support is not None else last if last >= 0 else None
+        self.support = way.support if way.support is not None else last if last >= 0 else None
         """Index of the support that the path moves, or else of the last support; None where there is no support."""
-        self._angles = angles
+        self._angles = way.angles
         self.branches = [Branch(inner, index, start) for index in range(inner.branches)]
         """The branch of `start`, then the branches that leave it, in the order found."""
 
@@ -282,6 +295,19 @@ class Diagram:
     def scenario(self) -> Scenario:
         """The scenario at the start of the path."""
         return self.start.scenario
+
+    @property
+    def reached(self) -> float:
+        """The parameter nearest to the end of the path among the states of all branches."""
+        parameters = np.concatenate([branch.parameter for branch in self.branches])
+        return float(parameters[np.argmin(np.abs(parameters - self.goal))])
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether a branch leads to the end of the path, or the first turns back and is followed to its own end."""
+        first = self.branches[0]
+        rounding = 1e-9 * abs(self.goal - float(first.parameter[0]))
+        return abs(self.reached - self.goal) <= rounding or first.end in {"range", "event", "closed"}
 
     def angle(self, parameter: npt.ArrayLike) -> Floats | None:
         """The angle in degrees by which the support has turned from its first pose, at places on the path.
@@ -301,13 +327,17 @@ class Diagram:
         """A table of all states of all branches, as columns: for `pandas.DataFrame(…)` or a CSV file.
 
         The columns are branch, state, parameter, energy, height, stable, negative_modes, event (its kind, or empty),
-        supports[0].force.x … supports[k].moment.z, least_bend_radius, least_spine_radius, rib_margin, status, residual,
-        confirmed (of the event; True without one), and angle along poses that have one. Where nothing bends the radii
-        are NaN.
+        supports[0].force.x … supports[k].moment.z, least_spine_radius, bend_radius.p999, bend_radius.p99,
+        bend_radius.p95 (exceeded on 99.9, 99 and 95 % of the area), least_bend_radius (over the width; falls with the
+        mesh), rib_margin, status, residual, confirmed (of the event; True without one), jump, released, and angle along
+        poses that have one. Where nothing bends the radii on the spine and over the width are NaN.
 
-        Shapes: (number of states,) each.
+        A branch that ends where the belt snaps has one row more, of the minimum after the snap: its event is "snap",
+        and jump and released are the size of the snap, NaN in other rows.
+
+        Shapes: (number of rows,) each.
         """
-        tables = [_columns(index, branch) for index, branch in enumerate(self.branches)]
+        tables = [_table(index, branch) for index, branch in enumerate(self.branches)]
         columns = {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
         angle = self.angle(columns["parameter"])
         return columns if angle is None else columns | {"angle": angle}
@@ -317,6 +347,8 @@ class Diagram:
         return {
             "schema": SCHEMA,
             "parameter_name": self.parameter_name,
+            "goal": self.goal,
+            "reached": self.reached,
             "scenario": self.scenario.to_dict(),
             "branches": [_branch_to_dict(branch) for branch in self.branches],
         }
@@ -366,7 +398,22 @@ def follow(  # noqa: PLR0913 - keywords all but two
         way = _changed(scenario if isinstance(scenario, Scenario) else scenario.scenario, path)
         start = _solved(scenario)
     inner = _core.follow(start._inner, way.inner, float(step), int(states), int(branches), bool(snaps), progress)  # noqa: SLF001
-    return Diagram(inner, start, way.parameter_name, way.support, way.angles)
+    return Diagram(inner, start, way)
+
+
+def out_of_reach(scenario: Scenario | Equilibrium, path: Mapping[str, float | npt.ArrayLike] | Poses) -> str | None:
+    """Where and why no belt can be led along a path, as far as the distance check of a solve proves it; else None.
+
+    A scenario whose support is led through poses is solved first; nothing else is solved.
+
+    Errors: those of `follow` for the path.
+    """
+    if isinstance(path, Poses):
+        way = _led(_solved(scenario), path)
+    else:
+        way = _changed(scenario if isinstance(scenario, Scenario) else scenario.scenario, path)
+    found = way.inner.out_of_reach()
+    return None if found is None else f"at {found[0]:g} along the path ({way.parameter_name}), {found[1]}"
 
 
 # ------------------------------------------------------------------------------------------------------- the path
@@ -517,9 +564,58 @@ def _event(  # noqa: PLR0913, PLR0917 - as the core gives them
     return Event(kind, parameter, state, negative_modes, equilibrium, place, confirmed, jump, released)
 
 
+def _table(index: int, branch: Branch) -> Columns:
+    """The rows of a branch, with that of the snap where it ends with one."""
+    columns = _columns(index, branch)
+    last = branch.events[-1] if branch.events else None
+    if branch.end != "unstable" or last is None or last.snapped is None:
+        return columns
+    snap = _snap_row(index, last, last.snapped)
+    return {name: np.append(column, np.array([snap[name]], column.dtype)) for name, column in columns.items()}
+
+
+def _snap_row(index: int, event: Event, shape: Equilibrium) -> dict[str, Any]:
+    """The row of the minimum after a snap."""
+    bulge = np.array(shape.scenario.to_dict()["solver"]["bulge"])
+    least, on_spine = shape.least_bend_radius, shape.least_spine_radius
+    row: dict[str, Any] = {
+        "branch": index,
+        "state": event.state,
+        "parameter": event.snapped_parameter,
+        "energy": shape.energy,
+        "height": float(shape.highest_point.position @ bulge / np.linalg.norm(bulge)),
+        "stable": shape.stable,
+        "negative_modes": shape.negative_modes or 0,
+        "event": SNAP,
+    }
+    for support in range(len(shape._inner.reactions)):  # noqa: SLF001 - of this package
+        row |= _components(support, shape.reaction(support))
+    return row | {
+        "least_spine_radius": math.nan if on_spine is None else on_spine.value,
+        **dict(zip(QUANTILES, shape.bend_radius.area, strict=True)),
+        "least_bend_radius": math.nan if least is None else least.value,
+        "rib_margin": shape.rib_margin.value,
+        "status": shape.status,
+        "residual": max(shape.residuals),
+        "confirmed": event.confirmed,
+        "jump": event.jump,
+        "released": event.released,
+    }
+
+
+def _components(support: int, reaction: Reaction) -> Columns:
+    """The components of a reaction, or of several, by the names of their columns."""
+    return {
+        f"supports[{support}].{quantity}.{axis}": np.moveaxis(vectors, -1, 0)[i]
+        for quantity, vectors in reaction._asdict().items()
+        for i, axis in enumerate("xyz")
+    }
+
+
 def _columns(index: int, branch: Branch) -> Columns:
     count = len(branch)
-    kinds, confirmed = [""] * count, [True] * count
+    # Wide enough for the name of a snap and of every kind.
+    kinds, confirmed = np.full(count, "", dtype=f"U{max(map(len, get_args(Kind)))}"), np.full(count, fill_value=True)
     for event in branch.events:
         kinds[event.state], confirmed[event.state] = event.kind, event.confirmed
     columns: Columns = {
@@ -530,19 +626,21 @@ def _columns(index: int, branch: Branch) -> Columns:
         "height": branch.height,
         "stable": np.array(branch.stable, dtype=object),
         "negative_modes": branch.negative_modes,
-        "event": np.array(kinds),
+        "event": kinds,
     }
     supports = len(branch._start._inner.reactions)  # noqa: SLF001 - of this package
     for support in range(supports):
-        for quantity, vectors in branch.reaction(support)._asdict().items():
-            columns |= {f"supports[{support}].{quantity}.{axis}": vectors[:, i] for i, axis in enumerate("xyz")}
+        columns |= _components(support, branch.reaction(support))
     return columns | {
-        "least_bend_radius": branch.least_bend_radius,
         "least_spine_radius": branch.least_spine_radius,
+        **dict(zip(QUANTILES, branch.area_radii.T, strict=True)),
+        "least_bend_radius": branch.least_bend_radius,
         "rib_margin": branch.rib_margin,
         "status": np.array(branch.status),
         "residual": branch.residual,
-        "confirmed": np.array(confirmed),
+        "confirmed": confirmed,
+        "jump": np.full(count, math.nan),
+        "released": np.full(count, math.nan),
     }
 
 

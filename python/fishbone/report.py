@@ -11,6 +11,8 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
+from fishbone.follow import SNAP
+
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
@@ -68,7 +70,7 @@ def report_diagram(diagram: Diagram) -> Group:
     events = [event for branch in diagram.branches for event in branch.events]
     unconfirmed = sum(not event.confirmed for event in events)
     has_events = unconfirmed < len(events)
-    left_out = Text(f"{unconfirmed} events are left out that a finer mesh does not confirm: try more solver.elements")
+    left_out = Text(_left_out(events))
     return Group(
         title,
         _branches(diagram),
@@ -76,6 +78,49 @@ def report_diagram(diagram: Diagram) -> Group:
         _events(diagram) if has_events else Text("no events"),
         *([left_out] if unconfirmed else []),
     )
+
+
+def _left_out(events: Sequence[Event]) -> str:
+    count = sum(not event.confirmed for event in events)
+    return f"{count} of {len(events)} events are left out that a finer mesh does not confirm: try more solver.elements"
+
+
+def shortfall(diagram: Diagram) -> str:
+    """One line: where and why a path is not followed to its end."""
+    # A belt that is led along its minima goes from branch to branch, else the others leave the first.
+    index = len(diagram.branches) - 1 if diagram.branches[0].end == "unstable" else 0
+    branch = diagram.branches[index]
+    remedy = {"budget": " (raise --states)", "unstable": " (raise --branches)"}.get(branch.end, "")
+    events = [event for branch in diagram.branches for event in branch.events]
+    left_out = "" if all(event.confirmed for event in events) else f"; {_left_out(events)}"
+    return (
+        f"the path ({diagram.parameter_name}) is followed to {number(diagram.reached)} of {number(diagram.goal)}: "
+        f"branch {index} {ENDS[branch.end]}{remedy}{left_out}"
+    )
+
+
+def below_limit(diagram: Diagram, limit: float) -> str:
+    """One line: where along a path the belt is bent to less than a radius on its spine, or that it is nowhere."""
+    radius = np.concatenate([branch.least_spine_radius for branch in diagram.branches])
+    places = np.concatenate([branch.parameter for branch in diagram.branches])
+    if np.isnan(radius).all():
+        return f"the belt does not bend: no radius is below the limit of {number(limit)}"
+    least = int(np.nanargmin(radius))
+    where = f"{number(radius[least])} at {_along(diagram, places[least])}"
+    if radius[least] >= limit:
+        return f"no bend on the spine is tighter than the limit of {number(limit)}: the least radius is {where}"
+    broken = places[radius < limit]
+    first, last = (_along(diagram, place) for place in (broken.min(), broken.max()))
+    return (
+        f"warning: the bend on the spine is tighter than the limit of {number(limit)} between {first} and {last}: "
+        f"the least radius is {where}"
+    )
+
+
+def _along(diagram: Diagram, parameter: float) -> str:
+    """A place on a path, in degrees where the path has an angle."""
+    angle = diagram.angle(parameter)
+    return f"{number(parameter)}" + ("" if angle is None else f" ({float(angle):.1f}°)")
 
 
 def number(value: float) -> str:
@@ -318,7 +363,7 @@ def _events(diagram: Diagram) -> Table:
     for heading in ("branch", "event"):
         table.add_column(heading)
     has_angle = diagram.angle(0.0) is not None
-    headings = ("negative", "energy", "snaps to", "moves by")
+    headings = ("negative", "energy", "moves by", "releases")
     for heading in ("parameter", *(["angle"] if has_angle else []), *headings):
         table.add_column(heading, justify="right")
     for index, branch in enumerate(diagram.branches):
@@ -327,10 +372,12 @@ def _events(diagram: Diagram) -> Table:
             angle = diagram.angle(event.parameter)
             angles = [] if angle is None else [f"{angle:.2f}°"]
             table.add_row(str(index), event.kind, number(event.parameter), *angles, *_event(event, energy[event.state]))
+            if event.snapped is not None and event.snapped_parameter is not None:
+                size = [number(size) for size in (event.snapped.energy, event.jump, event.released)]
+                table.add_row(str(index), SNAP, number(event.snapped_parameter), *angles, "", *size)
     return table
 
 
 def _event(event: Event, energy: float) -> list[str]:
     before, after = event.negative_modes
-    snap = [] if event.snapped is None else [event.snapped.energy, event.jump]
-    return [f"{before} → {after}", number(energy), *map(number, snap)]
+    return [f"{before} → {after}", number(energy)]

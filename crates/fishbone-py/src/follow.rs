@@ -29,6 +29,18 @@ impl Path {
             .map_err(|error| raised(py, &error))
     }
 
+    /// The parameter at the end of the path.
+    #[getter]
+    fn goal(&self) -> f64 {
+        self.0.parameter(self.0.length())
+    }
+
+    /// The parameter of the first end of a leg whose supports are proved to be out of reach, and why; nothing is solved.
+    fn out_of_reach(&self) -> Option<(f64, String)> {
+        let (parameter, supports) = self.0.out_of_reach()?;
+        Some((parameter, supports.to_string()))
+    }
+
     /// A support that moves through poses, each a position and a rotation vector, from one to the next by a motion's name.
     ///
     /// Errors: `NoPath`; `ValueError` if no motion has the name.
@@ -110,8 +122,8 @@ type Event = (
     Option<Snapped>,
 );
 
-/// Parameter, energy, height, forces and moments of the supports, least bend radius, least radius on the spine, rib margin,
-/// whether it is stable, status and largest residual.
+/// Parameter, energy, height, forces and moments of the supports, least bend radius, least radius on the spine, radii exceeded
+/// on 99.9, 99 and 95 % of the area, rib margin, whether it is stable, status and largest residual.
 type Report<'py> = (
     Scalars<'py>,
     Scalars<'py>,
@@ -120,6 +132,7 @@ type Report<'py> = (
     Grid<'py>,
     Scalars<'py>,
     Scalars<'py>,
+    [Scalars<'py>; 3],
     Scalars<'py>,
     Vec<Option<bool>>,
     Vec<&'static str>,
@@ -212,6 +225,11 @@ impl Diagram {
             array::grid(py, supports, wrenches().map(|wrench| wrench.moment))?,
             column(|s| s.least_bend_radius.unwrap_or(f64::NAN)),
             column(|s| s.least_spine_radius.unwrap_or(f64::NAN)),
+            [
+                column(|s| s.area_radii[0]),
+                column(|s| s.area_radii[1]),
+                column(|s| s.area_radii[2]),
+            ],
             column(|s| s.rib_margin),
             summaries.iter().map(Summary::stable).collect(),
             summaries.iter().map(|s| s.status.name()).collect(),

@@ -31,6 +31,12 @@ impl Scenario {
         checked(py, scenario::Scenario::from_json(text), file)
     }
 
+    /// Whether the material is given in SI units, so that all numbers are.
+    #[getter]
+    fn is_in_si_units(&self) -> bool {
+        self.0.scenario().belt.is_in_si_units()
+    }
+
     /// The scenario, normalised, as JSON.
     fn to_json(&self) -> String {
         self.0.scenario().to_json()

@@ -211,6 +211,8 @@ pub struct Summary {
     pub least_bend_radius: Option<f64>,
     /// Least radius of bend on the spine; `None` of a flat belt.
     pub least_spine_radius: Option<f64>,
+    /// Bend radii exceeded on 99.9, 99 and 95 % of the board's area; infinite where it is flat.
+    pub area_radii: [f64; 3],
     /// Margin of the ribs against crossing.
     pub rib_margin: f64,
     /// Stability by the second variation, where it is decided.
@@ -388,6 +390,7 @@ impl Diagram {
             reactions: equilibrium.reactions.iter().map(|on| on.wrench).collect(),
             least_bend_radius: surface::least_bend_radius(spine).map(|least| least.value),
             least_spine_radius: surface::least_spine_radius(spine).map(|least| least.value),
+            area_radii: surface::BendDistribution::of(spine).quantiles(),
             rib_margin: surface::rib_margin(spine).value,
             stability: equilibrium.stability,
             status: equilibrium.status,

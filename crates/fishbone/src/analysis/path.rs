@@ -3,7 +3,7 @@
 use crate::analysis::sensitivity::Motion as SupportMotion;
 use crate::geometry::{Pose, Twist, exp, log};
 use crate::names::named;
-use crate::problem::Problem;
+use crate::problem::{OutOfReach, Problem};
 use crate::scenario::error::ScenarioError;
 use nalgebra::Vector3;
 use std::fmt::Debug;
@@ -177,6 +177,20 @@ impl Path {
         let (support, mut motion) = self.change.support_motion(place)?;
         motion.translation /= self.base.units().length;
         Some((support, motion))
+    }
+
+    /// The first end of a leg of the path whose supports are proved to be out of reach, as its parameter, and the supports;
+    /// `None` where nothing is proved, and where the path begins out of reach. Nothing is solved.
+    pub fn out_of_reach(&self) -> Option<(f64, OutOfReach)> {
+        if self.base.unreachable_supports().is_some() {
+            return None;
+        }
+        let legs = self.length().ceil() as usize;
+        let mut ends = (1..=legs).map(|leg| self.length().min(leg as f64));
+        ends.find_map(|place| {
+            let supports = self.at(place)?.unreachable_supports()?;
+            Some((self.parameter(place), supports))
+        })
     }
 
     /// The problem at a place on the path, or a little before or beyond it; `None` where the scenario there is not valid.

@@ -106,7 +106,7 @@ impl Problem {
     /// # Errors
     ///
     /// [`ScenarioError`] where a scenario may not have so many elements, or so few.
-    pub fn with_elements(&self, elements: usize) -> Result<Self, ScenarioError> {
+    pub(crate) fn with_elements(&self, elements: usize) -> Result<Self, ScenarioError> {
         let mut scenario = Scenario::clone(&self.scenario);
         scenario.solver.elements = Some(elements);
         self.on_the_same_belt(scenario)

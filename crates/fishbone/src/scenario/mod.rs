@@ -163,7 +163,7 @@ impl BeltSpec {
     }
 
     /// Whether the belt's material is given in SI units: by name, or by a Young's modulus that is too large to be in MPa.
-    pub(crate) fn is_in_si_units(&self) -> bool {
+    pub fn is_in_si_units(&self) -> bool {
         /// Young's modulus above that of every sheet. Units: MPa.
         const STIFFEST: f64 = 2e6;
         let sheet = self.material.as_ref().and_then(MaterialSpec::layer);

@@ -80,7 +80,7 @@ impl Spine {
     /// # Panics
     ///
     /// If the lengths differ.
-    pub fn from_fields(
+    pub(crate) fn from_fields(
         width: f64,
         start: Pose,
         pieces: Vec<Piece>,
