@@ -9,6 +9,8 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.lines import Line2D
 
+from fishbone.units import labelled, scale, unit
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
@@ -19,6 +21,7 @@ if TYPE_CHECKING:
     from fishbone.equilibrium import Equilibrium
     from fishbone.follow import Branch, Diagram, Event
     from fishbone.names import Kind, Place
+    from fishbone.units import Quantity
 
     Floats = NDArray[np.float64]
     Style = dict[str, Any]
@@ -49,6 +52,8 @@ SHORTEST_SNAP = 0.02
 """Length, as a share of an axis, below which an arrow is not drawn: there another branch continues without a jump."""
 LIMIT: Style = {"color": "firebrick", "linestyle": "-.", "linewidth": 0.9}
 LANDED: Style = {"linestyle": "", "marker": ".", "markersize": 4.0, "color": "0.35", "zorder": 3}
+NOISE = 1e-7
+"""Extent of the shortest axis over the scale of its quantity: differences below are hardly more than residuals."""
 MAX_NAMED = 10
 """Greatest number of branches in the key: the colours of more branches are not distinguishable."""
 COLORS = ("viridis", 0.1, 0.8)
@@ -63,6 +68,8 @@ class Panel(NamedTuple):
     """The values of the quantity in the states of a branch."""
     at: Callable[[Equilibrium], float]
     """The value of the quantity in an equilibrium."""
+    least_extent: float
+    """Extent below which differences of the quantity are rounding: no axis is shorter."""
     limit: float | None = None
     """A value at which a line is drawn."""
 
@@ -83,35 +90,53 @@ def panels(diagram: Diagram, support: Place | None, limit: float | None) -> Iter
     """
     bulge = np.array(diagram.scenario.to_dict()["solver"]["bulge"])
     bulge /= np.linalg.norm(bulge)
-    yield Panel("energy", lambda branch: branch.energy, lambda shape: shape.energy)
+    scenario, start = diagram.scenario, diagram.start
+    length = unit(scenario, "length") or "length"
+
+    def floor(quantity: Quantity) -> float:
+        return NOISE * scale(start, quantity)
+
     yield Panel(
-        "height [length]", lambda branch: branch.height, lambda shape: float(shape.highest_point.position @ bulge)
+        labelled(scenario, "energy", "energy"),
+        lambda branch: branch.energy,
+        lambda shape: shape.energy,
+        floor("energy"),
+    )
+    yield Panel(
+        f"height [{length}]",
+        lambda branch: branch.height,
+        lambda shape: float(shape.highest_point.position @ bulge),
+        floor("length"),
     )
     index = diagram.support if support is None else diagram.start._support_index(support)  # noqa: SLF001
     if index is not None:
         yield Panel(
-            f"|force| of supports[{index}]",
+            labelled(scenario, f"|force| of supports[{index}]", "force"),
             lambda branch: np.linalg.norm(branch.reaction(index).force, axis=1),
             lambda shape: float(np.linalg.norm(shape.reaction(index).force)),
+            floor("force"),
         )
     yield (
-        _radius(limit)
+        Panel(
+            f"least radius\n[{length}]",
+            lambda branch: branch.least_spine_radius,
+            lambda shape: np.nan if shape.least_spine_radius is None else shape.least_spine_radius.value,
+            floor("length"),
+            limit,
+        )
         if limit is not None or diagram.angle(0.0) is not None
         else Panel(
-            "tightest bend\n[1/length]",
+            f"tightest bend\n[1/{length}]",
             lambda branch: np.nan_to_num(1.0 / branch.least_spine_radius),
             lambda shape: 0.0 if shape.least_spine_radius is None else 1.0 / shape.least_spine_radius.value,
+            floor("curvature"),
         )
     )
-    yield Panel("rib margin\n[1/length]", lambda branch: branch.rib_margin, lambda shape: float(shape.rib_margin.value))
-
-
-def _radius(limit: float | None) -> Panel:
-    return Panel(
-        "least radius\n[length]",
-        lambda branch: branch.least_spine_radius,
-        lambda shape: np.nan if shape.least_spine_radius is None else shape.least_spine_radius.value,
-        limit,
+    yield Panel(
+        f"rib margin\n[1/{length}]",
+        lambda branch: branch.rib_margin,
+        lambda shape: float(shape.rib_margin.value),
+        floor("curvature"),
     )
 
 
@@ -136,12 +161,21 @@ def draw(axes: Axes, diagram: Diagram, panel: Panel) -> bool:
     if snaps:
         axes.update_datalim([end for _, end in snaps])
         axes.autoscale_view()
+    widen(axes, panel.least_extent)
     shortest = SHORTEST_SNAP * np.ptp(axes.get_ylim())
     seen = [(start, end) for start, end in snaps if abs(end[1] - start[1]) > shortest]
     for start, end in seen:
         axes.plot(*end, **LANDED)
         axes.annotate("", end, start, arrowprops=SNAP)
     return bool(seen)
+
+
+def widen(axes: Axes, least_extent: float) -> None:
+    """Makes the vertical axis at least as long as an extent, about its middle, so that rounding is drawn as a line."""
+    low, high = axes.get_ylim()
+    if high - low < least_extent:
+        middle = 0.5 * (low + high)
+        axes.set_ylim(middle - 0.5 * least_extent, middle + 0.5 * least_extent)
 
 
 def runs(branch: Branch) -> Iterator[tuple[slice, bool | None]]:

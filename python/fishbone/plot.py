@@ -51,6 +51,7 @@ from fishbone.scene import (
     is_rigid,
     support_kind,
 )
+from fishbone.units import scale, unit, without_rounding
 
 if TYPE_CHECKING:
     import os
@@ -91,6 +92,8 @@ _WIDTH, _DECORATION, _GRAPHS, _KEY = 7.0, 0.6, 2.0, 0.55
 _PANEL = 1.4
 """Height of a panel of a diagram [in]."""
 _FLAT_HEIGHTS = (0.35, 2.4)
+_LEAST_ANGLE = 1e-6
+"""Extent of the shortest axis of rib angles [degrees]."""
 SHOWN = 12
 """Greatest number of equilibria on one page."""
 _COLUMNS, _PANEL_TITLE = 3, 0.25
@@ -227,7 +230,7 @@ def _draw(equilibrium: Equilibrium) -> Figure:
     for part in parts:
         part.patch.set_visible(False)  # its lower edge would be at 0 or at −0, as the arrays are in memory
     upper, middle, lower, key = parts
-    _draw_views(upper, scene)
+    _draw_views(upper, scene, _length(equilibrium))
     draw_flat(middle.subplots(), equilibrium)
     _draw_graphs(lower, equilibrium)
     key.legend(handles=list(_key(equilibrium)), loc="center", ncols=6, frameon=False)
@@ -237,10 +240,17 @@ def _draw(equilibrium: Equilibrium) -> Figure:
 def _title(equilibrium: Equilibrium) -> str:
     name = equilibrium.scenario.to_dict().get("name") or "belt"
     status = "" if equilibrium.status == "converged" else f", {equilibrium.status.replace('_', ' ')}"
-    return f"{name}: {equilibrium.energy_model} energy {equilibrium.energy:.5g}{status}"
+    return f"{name}: {equilibrium.energy_model} energy {_energy(equilibrium)}{status}"
 
 
-def _draw_views(figure: SubFigure, scene: Scene) -> None:
+def _energy(equilibrium: Equilibrium) -> str:
+    """The energy with its unit, 0 where it is rounding."""
+    energy = without_rounding(np.array(equilibrium.energy), scale(equilibrium, "energy"))
+    joule = unit(equilibrium.scenario, "energy")
+    return f"{float(energy):.5g}" + ("" if joule is None else f" {joule}")
+
+
+def _draw_views(figure: SubFigure, scene: Scene, length: str) -> None:
     low, high = scene.low, scene.high
     size = high - low
     top, corner, front, side = figure.subplots(
@@ -252,8 +262,8 @@ def _draw_views(figure: SubFigure, scene: Scene) -> None:
         axes.set(xlim=(low[right], high[right]), ylim=(low[up], high[up]), aspect="equal", title=view.title)
         axes.xaxis.set_major_locator(MultipleLocator(step))
         axes.yaxis.set_major_locator(MultipleLocator(step))
-        axes.set(xlabel=f"{AXES[right]} [length]" if axes is not top else "")
-        axes.set(ylabel=f"{AXES[up]} [length]" if axes is not side else "")
+        axes.set(xlabel=f"{AXES[right]} [{length}]" if axes is not top else "")
+        axes.set(ylabel=f"{AXES[up]} [{length}]" if axes is not side else "")
     top.tick_params(labelbottom=False)
     side.tick_params(labelleft=False)
     draw_lit(corner, scene, VIEWER)
@@ -262,7 +272,14 @@ def _draw_views(figure: SubFigure, scene: Scene) -> None:
 def _draw_graphs(figure: SubFigure, equilibrium: Equilibrium) -> None:
     angle, bend = figure.subplots(1, 2)
     _draw_graph(angle, equilibrium, np.degrees(equilibrium.rib_angle), "Rib angle", "α [degrees]")
-    _draw_graph(bend, equilibrium, equilibrium.bend, "Bend", "$ω_ζ$ [1/length]")
+    _draw_graph(bend, equilibrium, equilibrium.bend, "Bend", f"$ω_ζ$ [1/{_length(equilibrium)}]")
+    chart.widen(angle, _LEAST_ANGLE)
+    chart.widen(bend, chart.NOISE * scale(equilibrium, "curvature"))
+
+
+def _length(equilibrium: Equilibrium) -> str:
+    """The unit of length, or the word where it is not known."""
+    return unit(equilibrium.scenario, "length") or "length"
 
 
 def _draw_graph(axes: Axes, equilibrium: Equilibrium, values: Floats, title: str, label: str) -> None:
@@ -271,7 +288,7 @@ def _draw_graph(axes: Axes, equilibrium: Equilibrium, values: Floats, title: str
         axes.axvspan(first, last, color=str(LIGHT - 0.5 * RIGID), linewidth=0.0)
     axes.axhline(0.0, color="0.6", linewidth=0.5)
     axes.plot(u, values, color="black", linewidth=1.0)
-    axes.set(xlim=(u[0], u[-1]), xlabel="u [length]", ylabel=label, title=title)
+    axes.set(xlim=(u[0], u[-1]), xlabel=f"u [{_length(equilibrium)}]", ylabel=label, title=title)
     axes.xaxis.set_major_locator(MaxNLocator(6))
     axes.grid(visible=True, color="0.9", linewidth=0.5)
 
@@ -324,7 +341,7 @@ def _draw_overview(equilibria: Sequence[Equilibrium], viewer: ArrayLike) -> Figu
     for index, (axes, equilibrium) in enumerate(zip(panels, shown, strict=False)):
         draw_oblique(axes, equilibrium, viewer)
         crossing = "" if equilibrium.crosses_itself is None else "\npasses through itself"
-        axes.set_title(f"{index}: {equilibrium.energy:.5g}, {stability(equilibrium)}{crossing}")
+        axes.set_title(f"{index}: {_energy(equilibrium)}, {stability(equilibrium)}{crossing}")
     for axes in panels[len(shown) :]:
         axes.set_axis_off()
     height = side * _set_one_scale(panels[: len(shown)])
@@ -390,7 +407,8 @@ def draw_flat(axes: Axes, equilibrium: Equilibrium) -> None:
     spine = equilibrium.flat_spine()
     axes.plot(*spine.T, zorder=2, **SPINE)
     axes.plot(*spine[0], zorder=3, **START)
-    axes.set(aspect="equal", title="Flat board", xlabel="y [length]", ylabel="z [length]")
+    length = _length(equilibrium)
+    axes.set(aspect="equal", title="Flat board", xlabel=f"y [{length}]", ylabel=f"z [{length}]")
     axes.autoscale_view()
     # Along the width of a narrow board there is little room for numbers.
     axes.xaxis.set_major_locator(MaxNLocator(6 if np.ptp(axes.get_xlim()) > np.ptp(axes.get_ylim()) else 4))

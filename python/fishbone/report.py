@@ -12,6 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from fishbone.follow import SNAP
+from fishbone.units import labelled, scale, unit, without_rounding
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
     from fishbone.equilibrium import Equilibrium, Floats
     from fishbone.follow import Branch, Diagram, Event
     from fishbone.names import End
+    from fishbone.scenario import Scenario
+    from fishbone.units import Quantity
 
 DIGITS = 5
 """Significant digits, about the accuracy of the default mesh."""
@@ -132,11 +135,16 @@ def number(value: float) -> str:
     return f"{value + 0.0:.{DIGITS}g}"
 
 
-def row(vector: Floats) -> list[str]:
+def row(vector: Floats, size: float = 0.0) -> list[str]:
     """The components of a vector with equal decimals, five significant digits in the largest.
 
     >>> row(np.array([12.3456, -0.0000004, 1.0]))
     ['12.346', '0.000', '1.000']
+
+    Components that are rounding, of the largest or of a size, are 0.
+
+    >>> row(np.array([-2e-9, 1e-25, -0.0])), row(np.array([6.6e-128, 0.0, 0.0]), size=1.0)
+    (['-2.0000e-09', '0', '0'], ['0.0000', '0.0000', '0.0000'])
 
     A component that is NaN is not determined.
 
@@ -144,14 +152,23 @@ def row(vector: Floats) -> list[str]:
     ['1.0000', 'not determined', '0.0000']
     """
     largest = float(np.max(np.abs(vector), initial=0.0, where=~np.isnan(vector)))
+    vector = without_rounding(vector, max(largest, size))
+    largest = float(np.max(np.abs(vector), initial=0.0, where=~np.isnan(vector)))
     decimals = DIGITS - 1 - math.floor(math.log10(largest)) if largest > 0.0 else DIGITS - 1
     if not 0 <= decimals <= 2 * DIGITS:
-        return [UNDETERMINED if math.isnan(component) else f"{component:.{DIGITS - 1}e}" for component in vector]
+        return [_component(component) for component in vector.tolist()]
     # Adding 0.0 turns a rounded −0 into 0.
     return [
         UNDETERMINED if math.isnan(component) else f"{round(component, decimals) + 0.0:.{decimals}f}"
         for component in vector.tolist()
     ]
+
+
+def _component(value: float) -> str:
+    """A number with an exponent."""
+    if math.isnan(value):
+        return UNDETERMINED
+    return f"{value:.{DIGITS - 1}e}" if value else "0"
 
 
 def _scalars(equilibrium: Equilibrium) -> Table:
@@ -185,9 +202,11 @@ def _held(support: dict[str, Any]) -> str:
 
 
 def _quantities(equilibrium: Equilibrium) -> Iterator[tuple[str, str, str]]:
-    yield "energy", number(equilibrium.energy), ""
+    energies = {"energy": equilibrium.energy}
     if equilibrium.elastic_energy != equilibrium.energy:
-        yield "elastic energy", number(equilibrium.elastic_energy), ""
+        energies["elastic energy"] = equilibrium.elastic_energy
+    for name, energy in energies.items():
+        yield name, _number(equilibrium, energy, "energy"), unit(equilibrium.scenario, "energy") or ""
     yield from _extremes(equilibrium)
     yield "side", f"{equilibrium.side:+d}" if equilibrium.side else "0", SIDE[equilibrium.side]
     if equilibrium.half_turns is not None:
@@ -204,10 +223,12 @@ def _quantities(equilibrium: Equilibrium) -> Iterator[tuple[str, str, str]]:
 
 def _extremes(equilibrium: Equilibrium) -> Iterator[tuple[str, str, str]]:
     on_spine, over_area = equilibrium.bend_radius
+    metre = unit(equilibrium.scenario, "length")
+    length = "" if metre is None else f"{metre}, "
     if on_spine is not None:
-        yield "least bend radius, on the spine", number(on_spine.value), f"at u = {number(on_spine.u)}"
+        yield "least bend radius, on the spine", number(on_spine.value), f"{length}at u = {number(on_spine.u)}"
     if math.isfinite(over_area.p99):
-        yield "bend radius, 99 % of the area", number(over_area.p99), "or more"
+        yield "bend radius, 99 % of the area", number(over_area.p99), f"{length}or more"
     angle = np.degrees(equilibrium.rib_angle)
     angle[np.abs(angle) < NOUGHT] = 0.0
     largest = int(np.argmax(np.abs(angle)))
@@ -226,42 +247,47 @@ def _vectors(equilibrium: Equilibrium) -> Table:
     table.add_column("world axes")
     for axis in "xyz":
         table.add_column(axis, justify="right")
-    for name, vector in _named_vectors(equilibrium):
-        table.add_row(name, *row(vector))
+    for name, vector, quantity in _named_vectors(equilibrium):
+        table.add_row(Text(labelled(equilibrium.scenario, name, quantity)), *row(vector, scale(equilibrium, quantity)))
     return table
 
 
-def _named_vectors(equilibrium: Equilibrium) -> Iterable[tuple[str, Floats]]:
+def _number(equilibrium: Equilibrium, value: float, quantity: Quantity) -> str:
+    """A number of an equilibrium; 0 where it is rounding."""
+    return number(float(without_rounding(np.array(value), scale(equilibrium, quantity))))
+
+
+def _named_vectors(equilibrium: Equilibrium) -> Iterable[tuple[str, Floats, Quantity]]:
     u, position = equilibrium.highest_point
-    yield f"highest point, u = {number(u)}", position
+    yield f"highest point, u = {number(u)}", position, "length"
     tables = equilibrium.scenario.to_dict()
     yield from _free_ends(tables, equilibrium)
     yield from _loads(tables, equilibrium.u)
     for index, support in enumerate(tables["supports"]):
         place = _place(support["at"], equilibrium.u)
         force, moment = equilibrium.reaction(index)
-        yield f"force on the belt, {place}", force
-        yield f"moment on the belt, {place}", moment
+        yield f"force on the belt, {place}", force, "force"
+        yield f"moment on the belt, {place}", moment, "moment"
     # The source's method has no forces.
     for link, force in zip(tables.get("links", []), equilibrium.links, strict=False):
         ends = [_place(link[end], equilibrium.u) for end in ("from", "to")]
-        yield f"force of the link from {ends[0]}, {ends[1]}", force
+        yield f"force of the link from {ends[0]}, {ends[1]}", force, "force"
 
 
-def _free_ends(tables: dict[str, Any], equilibrium: Equilibrium) -> Iterator[tuple[str, Floats]]:
+def _free_ends(tables: dict[str, Any], equilibrium: Equilibrium) -> Iterator[tuple[str, Floats, Quantity]]:
     """Positions of the ends of an open belt that no support holds."""
     held = {_place(support["at"], equilibrium.u) for support in tables["supports"] if support.get("position")}
     for name, node in [("start", 0), ("end", -1)]:
         if name not in held and not tables["belt"].get("closed"):
-            yield f"free {name}", equilibrium.position[node]
+            yield f"free {name}", equilibrium.position[node], "length"
 
 
-def _loads(tables: dict[str, Any], u: Floats) -> Iterator[tuple[str, Floats]]:
+def _loads(tables: dict[str, Any], u: Floats) -> Iterator[tuple[str, Floats, Quantity]]:
     loads = tables.get("loads", {})
     if loads.get("gravity") is not None:
-        yield "gravity", np.array(loads["gravity"])
+        yield "gravity", np.array(loads["gravity"]), "acceleration"
     for load in loads.get("points", []):
-        yield f"load, {_place(load['at'], u)}", np.array(load["force"])
+        yield f"load, {_place(load['at'], u)}", np.array(load["force"]), "force"
 
 
 def _place(at: float | str, u: Floats) -> str:
@@ -280,21 +306,29 @@ def _place(at: float | str, u: Floats) -> str:
 def _equilibria(equilibria: Sequence[Equilibrium]) -> Table:
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
     table.add_column("", justify="right")
-    table.add_column("energy", justify="right", no_wrap=True)
+    scenario = equilibria[0].scenario
+    table.add_column(_heading(scenario, "energy", "energy"), justify="right", no_wrap=True)
     table.add_column("local\nminimum")
-    for heading in ("negative\nmodes", "height", "bend\nradius\non spine", "largest\nforce", "twist"):
+    headings = (
+        "negative\nmodes",
+        _heading(scenario, "height", "length"),
+        _heading(scenario, "bend\nradius\non spine", "length"),
+        _heading(scenario, "largest\nforce", "force"),
+        "twist",
+    )
+    for heading in headings:
         table.add_column(heading, justify="right", no_wrap=True)
     table.add_column("crosses\nitself")
     radii = [equilibrium.least_spine_radius for equilibrium in equilibria]
     columns = [
         [str(index) for index in range(len(equilibria))],
-        [number(equilibrium.energy) for equilibrium in equilibria],
+        [_number(equilibrium, equilibrium.energy, "energy") for equilibrium in equilibria],
         [MINIMUM[equilibrium.stable] for equilibrium in equilibria],
         ["" if one.negative_modes is None else str(one.negative_modes) for one in equilibria],
-        _column([_height(equilibrium) for equilibrium in equilibria]),
+        _column([_height(equilibrium) for equilibrium in equilibria], scale(equilibria[0], "length")),
         _column([None if radius is None else radius.value for radius in radii]),
-        _column([_largest_force(equilibrium) for equilibrium in equilibria]),
-        _column([equilibrium.twist for equilibrium in equilibria]),
+        _column([_largest_force(equilibrium) for equilibrium in equilibria], scale(equilibria[0], "force")),
+        _column([equilibrium.twist for equilibrium in equilibria], 1.0),
         ["no" if equilibrium.crosses_itself is None else "yes" for equilibrium in equilibria],
     ]
     for cells in zip(*columns, strict=True):
@@ -302,10 +336,17 @@ def _equilibria(equilibria: Sequence[Equilibrium]) -> Table:
     return table
 
 
-def _column(values: Sequence[float | None]) -> list[str]:
+def _heading(scenario: Scenario, words: str, quantity: Quantity) -> Text:
+    """The heading of a column, with the unit in a line of its own."""
+    name = unit(scenario, quantity)
+    # As plain text, since brackets are also marks of style.
+    return Text(words if name is None else f"{words}\n[{name}]")
+
+
+def _column(values: Sequence[float | None], size: float = 0.0) -> list[str]:
     """Numbers with equal decimals; an empty cell for None."""
     numbers = np.array([value for value in values if value is not None])
-    cells = iter(row(numbers) if len(numbers) else [])
+    cells = iter(row(numbers, size) if len(numbers) else [])
     return ["" if value is None else next(cells) for value in values]
 
 
@@ -326,14 +367,19 @@ def _largest_force(equilibrium: Equilibrium) -> float | None:
 
 def _branches(diagram: Diagram) -> Table:
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for heading in ("branch", "begins"):
-        table.add_column(heading)
-    for heading in ("stable", "parameter", "energy"):
+    for name in ("branch", "begins"):
+        table.add_column(name)
+    energy = Text(labelled(diagram.scenario, "energy", "energy"))
+    for heading in (Text("stable"), Text("parameter"), energy):
         table.add_column(heading, justify="right")
     for index, branch in enumerate(diagram.branches):
         stable = f"{branch.stable.count(True)} of {len(branch)}"
         table.add_row(
-            str(index), _beginning(diagram, branch), stable, *map(_from_to, (branch.parameter, branch.energy))
+            str(index),
+            _beginning(diagram, branch),
+            stable,
+            _from_to(branch.parameter),
+            _from_to(without_rounding(branch.energy, scale(diagram.start, "energy"))),
         )
     return table
 
@@ -360,11 +406,19 @@ def _from_to(values: Floats) -> str:
 
 def _events(diagram: Diagram) -> Table:
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for heading in ("branch", "event"):
-        table.add_column(heading)
-    has_angle = diagram.angle(0.0) is not None
-    headings = ("negative", "energy", "moves by", "releases")
-    for heading in ("parameter", *(["angle"] if has_angle else []), *headings):
+    for name in ("branch", "event"):
+        table.add_column(name)
+    turned = [] if diagram.angle(0.0) is None else [Text("angle")]
+    scenario = diagram.scenario
+    headings = (
+        Text("parameter"),
+        *turned,
+        Text("negative"),
+        _heading(scenario, "energy", "energy"),
+        _heading(scenario, "moves by", "length"),
+        _heading(scenario, "releases", "energy"),
+    )
+    for heading in headings:
         table.add_column(heading, justify="right")
     for index, branch in enumerate(diagram.branches):
         energy = branch.energy

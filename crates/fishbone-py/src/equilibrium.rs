@@ -90,6 +90,13 @@ impl Equilibrium {
         self.solved.elastic_energy
     }
 
+    /// The length U of the belt, and its mean rigidity R_f over U.
+    #[getter]
+    fn scales(&self) -> (f64, f64) {
+        let units = self.solved.problem().units();
+        (units.length, units.energy)
+    }
+
     #[getter]
     fn energy_model(&self) -> &'static str {
         self.solved.scenario().energy.name()

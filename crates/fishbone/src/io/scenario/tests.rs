@@ -1065,7 +1065,7 @@ fn a_solver_setting_outside_its_range_is_refused() {
         (
             "elements = 80",
             "snap_size = -0.1",
-            "solver.snap_size: found -0.1, must be from 0e0 to 1e1",
+            "solver.snap_size: found -0.1, must be from 0 to 10",
         ),
         (
             "tolerance = 1e-8",

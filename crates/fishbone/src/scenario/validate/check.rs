@@ -41,7 +41,11 @@ pub(super) fn between<T: Display>(range: &RangeInclusive<T>) -> String {
 }
 
 pub(super) fn span(range: &RangeInclusive<f64>) -> String {
-    format!("from {:e} to {:e}", range.start(), range.end())
+    let bound = |value: f64| match value == 0.0 || (1.0..1e6).contains(&value) {
+        true => format!("{value}"),
+        false => format!("{value:e}"),
+    };
+    format!("from {} to {}", bound(*range.start()), bound(*range.end()))
 }
 
 pub(super) fn is_positive(value: f64) -> bool {
