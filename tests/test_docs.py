@@ -50,6 +50,35 @@ def test_files_that_are_named_exist(page):
     assert not [path for path in paths if not (ROOT / path).exists()]
 
 
+def block(page, name):
+    """The cells of a measured table, row by row, without its head."""
+    text = re.search(rf"<!-- {name} -->(.*?)<!-- /{name} -->", page, re.DOTALL)[1]
+    rows = [line for line in text.splitlines() if line.startswith("|")]
+    return [[cell.strip() for cell in row.strip("|").split("|")] for row in rows[2:]]
+
+
+def test_the_page_of_validation_names_every_aim_that_is_missed():
+    page = (ROOT / "docs" / "validation.md").read_text("utf-8")
+    measured = {"≤ 50 ms": r"(\d+) ms", "≤ 2": r"^([\d.]+)", "≤ 1 s": r"in (\d+) s"}
+    aims = [row for row in block(page, "before and after") if row[4] == "aim"]
+    assert {aim for _, _, _, aim, _ in aims} <= set(measured)
+    missed = [
+        case
+        for case, _, after, aim, _ in aims
+        if float(re.search(measured[aim], after)[1]) > float(re.search(r"\d+", aim)[0])
+    ]
+    named = re.search(r"\n\nAims that are missed:\n\n(.*?)\n\n", page, re.DOTALL)[1]
+    assert [item.removeprefix("- ") for item in named.splitlines()] == missed
+
+
+def test_the_readme_has_the_distances_from_the_shell_that_were_measured():
+    distances = {row[0]: row[2:] for row in block((ROOT / "docs" / "validation.md").read_text("utf-8"), "shell")}
+    readme = (ROOT / "README.md").read_text("utf-8")
+    for thickness, case in (("140 µm", "`example2`"), ("35 µm", "`example2_h4`")):
+        [row] = re.findall(rf"^\| {thickness} \| (.+) \|$", readme, re.MULTILINE)
+        assert row.split(" | ") == [f"{float(distance):.1f}e-3 U" for distance in distances[case]]
+
+
 @pages
 def test_lines_fit_the_page(page):
     lines = page.read_text().splitlines()
