@@ -71,6 +71,32 @@ def test_the_page_of_validation_names_every_aim_that_is_missed():
     assert [item.removeprefix("- ") for item in named.splitlines()] == missed
 
 
+def test_the_page_of_shapes_agrees_with_its_table():
+    page = (ROOT / "docs" / "shapes.md").read_text("utf-8")
+    table = block(page, "shapes")
+    counts = [*re.findall(r"the (\d+) other shapes", page), *re.findall(r"margin of all (\d+)", page)]
+    assert counts == [str(len(table))] * 2
+    margins = {row[0]: float(row[5]) for row in table if row[0]}
+    [moved] = re.findall(r"\(a\) may snap when the far clamp moves by (\d\.\d+)", page)
+    assert float(moved) == margins["a"]
+    [widths] = re.findall(r"([\d.]+) in \(b\), ([\d.]+) in \(c\)", page)
+    assert list(map(float, widths)) == [round(margins["b"], 2), round(margins["c"], 2)]
+    assert max(margins["d"], margins["e"]) <= 0.02
+
+
+@pytest.mark.full
+def test_the_pages_have_the_counts_of_the_shapes_that_are_found():
+    found = fb.branches(fb.load(ROOT / "docs" / "shapes.toml"))
+    minima = [shape for shape in found if shape.stable]
+    crossing = [shape for shape in minima if shape.crosses_itself is not None]
+    page = " ".join((ROOT / "docs" / "shapes.md").read_text("utf-8").split())
+    saddles = len(found) - len(minima)
+    assert f"finds {len(found)} equilibria: {len(minima)} minima and {saddles} saddle" in page
+    assert f"{len(crossing)} of the minima pass through themselves" in page
+    assert f"the {len(minima) - len(crossing)} other shapes" in page
+    assert f"{len(found)} equilibria, rising in energy" in (ROOT / "README.md").read_text("utf-8")
+
+
 def test_the_readme_has_the_distances_from_the_shell_that_were_measured():
     distances = {row[0]: row[2:] for row in block((ROOT / "docs" / "validation.md").read_text("utf-8"), "shell")}
     readme = (ROOT / "README.md").read_text("utf-8")
