@@ -9,7 +9,21 @@ import numpy as np
 import pytest
 
 import fishbone as fb
-from helpers import ORIGIN, Json, arc, board, clamped, numbers, result, solve, straight, support
+from helpers import (
+    ORIGIN,
+    Json,
+    arc,
+    belt,
+    board,
+    clamped,
+    numbers,
+    result,
+    rotation_matrix,
+    rotation_vector,
+    solve,
+    straight,
+    support,
+)
 
 C_SHAPE = [straight(0.01), arc(0.02 * math.pi, 50.0), straight(0.01)]
 HALF_TURN = (math.pi, 0.0, 0.0)
@@ -66,7 +80,8 @@ def test_side_is_that_of_the_area_under_the_spine() -> None:
     tables["solver"]["bulge"] = [0.0, 1.0, 0.0]
     along_the_chord = fb.solve(fb.Scenario.from_dict(tables))
     assert along_the_chord.side == 0
-    assert along_the_chord.warnings == []
+    [warning] = along_the_chord.warnings
+    assert "solver.bulge chooses neither of two mirror images" in warning
     flat = solve(board([straight(1.0)], [support("start", ORIGIN, ORIGIN)]))
     assert flat.side == 0
 
@@ -96,3 +111,54 @@ def test_loads_draw_a_belt_held_at_one_end_to_their_side_without_a_warning() -> 
     belt = solve(tables)
     assert belt.side == -1
     assert belt.warnings == []
+
+
+def turned(tables: Json, turn: Any) -> Json:
+    """The same belt, supports and bulge turned in space."""
+    frame = rotation_matrix(turn)
+    for held in tables["supports"]:
+        held["position"] = numbers(frame @ held["position"])
+        held["rotation"] = numbers(rotation_vector(frame @ rotation_matrix(held["rotation"])))
+    tables["solver"]["bulge"] = numbers(frame[:, 0])
+    return tables
+
+
+TURNS = [(0.0, 0.0, 0.0), (0.0, 0.3, 0.0), (0.5, -1.1, 0.7)]
+
+
+def twisted(width: float, offset: float, angle: float, distance: float = 0.8) -> Json:
+    ends = [support("start", ORIGIN, ORIGIN), support("end", (offset, distance, 0.0), (0.0, angle, 0.0))]
+    return belt(ends, width=width, bulge=(1.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("turn", TURNS)
+@pytest.mark.parametrize(("width", "energy"), [(0.01, 19.203), (0.001, 19.066)])
+def test_slender_belt_bulges_to_the_side_asked_for(turn: Any, width: float, energy: float) -> None:
+    """A quarter twist with an offset of a tenth: the minimum on the other side has less energy, 18.0."""
+    found = solve(turned(twisted(width, 0.1, math.pi / 2.0), turn))
+    assert (found.side, found.warnings) == (1, [])
+    assert found.energy == pytest.approx(energy, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("offset", "distance"), [(0.1, 0.05), (0.1, 0.8), (0.1, -0.3), (0.2, 0.4), (0.2, 0.8), (0.2, -0.3)]
+)
+def test_shape_after_a_half_twist_is_the_same_however_it_lies_in_space(offset: float, distance: float) -> None:
+    belts = [solve(turned(twisted(0.1, offset, math.pi, distance), turn)) for turn in TURNS]
+    assert len({belt.side for belt in belts}) == 1
+    assert [belt.energy for belt in belts] == pytest.approx([belts[0].energy] * len(belts), rel=1e-6)
+
+
+@pytest.mark.parametrize("angle", [math.pi / 2.0, -math.pi / 2.0])
+def test_unclear_side_without_a_minimum_is_warned_of(angle: float) -> None:
+    """Turned by a quarter turn about the normal, the belt bulges mostly along its width."""
+    ends = [support("start", ORIGIN, ORIGIN), support("end", (0.2, 0.05, 0.0), (angle, 0.0, 0.0))]
+    found = solve(belt(ends, elements=80))
+    assert found.side == -1
+    assert any("no minimum was found on the side of solver.bulge" in warning for warning in found.warnings)
+
+
+def test_belt_that_has_snapped_to_the_other_side_as_it_was_wound_is_warned_of() -> None:
+    found = solve(twisted(0.1, 0.0, 8.0 * math.pi))
+    assert found.side == -1
+    assert any("lies on the other side than solver.bulge" in warning for warning in found.warnings)

@@ -27,6 +27,10 @@ const NARROW: f64 = 1e-3;
 const NARROWEST: f64 = 1e-7;
 /// Miss of the supports by which one side of a ring must be the better to be preferred, lengths in U and angles in rad.
 const NEARER: f64 = 1e-6;
+/// Cost by which an arch must be the better to be preferred, as a share of the cost.
+const LEVEL: f64 = 1e-6;
+/// Angle by which a rotation may be off by rounding, in rad.
+const ROUNDING: f64 = 1e-9;
 /// Bend up to which a node counts as flat, in rad/U.
 const FLAT: f64 = 1e-6;
 /// Bend given to a flat belt that may buckle, in rad/U.
@@ -346,7 +350,12 @@ fn fit_arch(
         let top = frame * exp(&(0.5 * gap));
         let towards = top.column(0).dot(&bulge.normalize());
         let is_clear = towards.abs() >= 0.5;
-        let sides = [1.0, -1.0].map(|side: f64| (side, side * towards));
+        let first = if frame.column(0).dot(bulge) < 0.0 {
+            -1.0
+        } else {
+            1.0
+        };
+        let sides = [first, -first].map(|side: f64| (side, side * towards));
         let sides = sides
             .into_iter()
             .filter(move |(_, towards)| *towards >= 0.0 || !is_clear);
@@ -356,16 +365,24 @@ fn fit_arch(
         let arch = fitted(gap, side);
         (arch.energy() + MISS * miss(&arch) - BULGE * towards, arch)
     });
-    let best = costed.min_by(|a, b| a.0.total_cmp(&b.0));
+    // Of two that cost the same but for rounding, the first.
+    let best = costed.reduce(|best, next| match best.0 - next.0 > LEVEL * best.0.abs() {
+        true => next,
+        false => best,
+    });
     best.map_or_else(|| fitted(&Vector3::zeros(), 1.0), |(_, arch)| arch)
 }
 
-/// The rotation vectors of a rotation, the shorter way and, beyond a quarter turn, the longer.
+/// The rotation vectors of a rotation, the shorter way and, beyond a quarter turn, the longer. Of half a turn, whose ways are
+/// equally long, first the one whose largest component is positive.
 fn ways_round(rotation: &UnitQuaternion<f64>) -> Vec<Vector3<f64>> {
     let shorter = log(rotation.to_rotation_matrix().matrix());
     let angle = shorter.norm();
-    match angle > FRAC_PI_2 {
-        true => vec![shorter, shorter * (1.0 - TAU / angle)],
+    let longer = shorter * (1.0 - TAU / angle);
+    let is_negative = shorter[shorter.iamax()] < 0.0;
+    match angle > FRAC_PI_2 + ROUNDING {
+        true if is_negative && angle > PI - ROUNDING => vec![longer, shorter],
+        true => vec![shorter, longer],
         false => vec![shorter],
     }
 }

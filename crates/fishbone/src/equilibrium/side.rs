@@ -1,8 +1,10 @@
 //! The side to which a belt bulges, and the search on the other side, which begins at its mirror images.
 
 use super::intrinsic::solve;
-use super::search::{fields_at, prolong};
-use super::{Equilibrium, Solved, Start, minimum_from};
+use super::search::{Search, fields_at, prolong};
+use super::{
+    Equilibrium, Solved, Start, is_slender_on_graded_mesh, minimum_from, slender_minimum_near,
+};
 use crate::geometry::Pose;
 use crate::problem::program::{BeltPoint, BeltProgram, NodeSupport, Piece};
 use crate::problem::{Mesh, Problem};
@@ -13,9 +15,10 @@ use std::ops::ControlFlow;
 
 /// Mean distance from the chords along the bulge up to which a belt lies on neither side, in U.
 const NEITHER: f64 = 1e-4;
-/// Share of the mean distance from the chords, in whatever direction, from which the part along the bulge is more than a
-/// by-product of the rest, dimensionless.
-const CLEAR: f64 = 0.2;
+/// Mean distance from the chords from which a belt bulges to some side, in U.
+const BULGES: f64 = 1e-2;
+/// Loads along the bulge that push a belt over to its side, per unit length, in mean R_f/U².
+const PUSHES: [f64; 3] = [30.0, 100.0, 300.0];
 /// Miss of the supports up to which a mirror image meets them, lengths in U and angles in rad.
 const MET: f64 = 1e-6;
 
@@ -84,44 +87,110 @@ fn mean_distance(u: &[f64], poses: &[Pose], held: &[usize]) -> Vector3<f64> {
     0.5 * area / span
 }
 
-/// A minimum that was found from the guess, or one on the side of the bulge if that one lies on the other side: a mirror image
-/// that is a minimum too. Of a belt that bulges clearly between held places also a minimum that a search from
-/// a mirror image finds, and a warning if none is found; elsewhere loads and clamps draw the belt to their side.
+/// A minimum, or one on the side of the bulge if that one lies on the other side: a mirror image that is a minimum too. Of a
+/// belt between held places also a minimum that a search from a mirror image finds, or one that the belt keeps after a load
+/// has pushed it over; a warning if none is found. Elsewhere loads and clamps draw the belt to their side.
+///
+/// A belt between held places that bulges square to `solver.bulge`, as its mirror image does to the opposite side, gets a
+/// warning too.
 pub(super) fn on_side_of_bulge(
     mut found: Equilibrium,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Equilibrium {
-    let is_wrong = found.is_minimum() && found.side() < 0;
-    let Some(solved) = found.solved.as_ref().filter(|_| is_wrong) else {
+    let Some((solved, is_between)) = solved_minimum(&found) else {
         return found;
     };
-    let distance = found.mean_distance();
-    let along_bulge = distance.dot(&found.problem.bulge().normalize()).abs();
-    let is_between = solved.program.half_turns.is_none() && held_nodes(&solved.program).len() > 1;
-    let is_clear = is_between && along_bulge > CLEAR * distance.norm();
-    let images = Image::all(&found.problem, solved);
-    let twins = images.iter().filter(|image| image.is_twin);
-    let twins = twins.map(|image| (image, true));
-    let nearest = images.first().filter(|_| is_clear);
+    if found.side() >= 0 {
+        let is_open = is_between && found.side() == 0;
+        if is_open && Image::has_opposite_twin(&found, solved) {
+            let warning =
+                "solver.bulge chooses neither of two mirror images: the belt bulges square to it";
+            found.warnings.push(warning.to_owned());
+        }
+        return found;
+    }
+    let problem = &found.problem;
+    let images = Image::all(problem, solved);
+    let [twins, others]: [Vec<_>; 2] =
+        [true, false].map(|is_twin| images.iter().filter(|i| i.is_twin == is_twin).collect());
     let mut iterations = found.iterations;
-    for (image, is_twin) in twins.chain(nearest.map(|image| (image, false))) {
-        let mut other = match is_twin {
-            true => image.twin(&found, solved, proceed),
-            false => image.search(&found.problem, solved, proceed),
-        };
+    let mut is_on_side = |mut other: Equilibrium| {
         iterations += other.iterations;
-        if other.is_minimum() && other.side() > 0 {
-            other.iterations = iterations;
+        other.iterations = iterations;
+        (other.is_minimum() && other.side() > 0).then_some(other)
+    };
+    for twin in twins {
+        if let Some(other) = is_on_side(twin.twin(&found, solved, proceed)) {
             return other;
         }
     }
+    if is_between {
+        let nearest = others
+            .first()
+            .map(|image| image.search(problem, solved, proceed));
+        if let Some(other) = nearest.and_then(&mut is_on_side) {
+            return other;
+        }
+        for push in PUSHES {
+            if let Some(other) = is_on_side(pushed_over(problem, solved, push, proceed)) {
+                return other;
+            }
+        }
+        let warning = "no minimum was found on the side of solver.bulge: this one lies on the other side; a search for all \
+                       equilibria, solve --all or branches, looks farther";
+        found.warnings.push(warning.to_owned());
+    }
     found.iterations = iterations;
-    if is_clear {
-        let warning =
-            "no minimum was found on the side of solver.bulge: this one lies on the other side";
+    found
+}
+
+/// A wound belt, or its twin on the side of the bulge that is wound alike; without one a warning that it lies on the other
+/// side.
+pub(super) fn wound_on_side_of_bulge(
+    mut found: Equilibrium,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Equilibrium {
+    let Some((solved, is_between)) = solved_minimum(&found).filter(|_| found.side() < 0) else {
+        return found;
+    };
+    for image in Image::all(&found.problem, solved) {
+        if image.is_twin && !image.changes_hand {
+            let mut twin = image.twin(&found, solved, proceed);
+            if twin.is_minimum() && twin.side() > 0 {
+                twin.iterations += found.iterations;
+                return twin;
+            }
+        }
+    }
+    if is_between {
+        let warning = "the belt was followed through the turns of its supports, and lies on the other side than solver.bulge";
         found.warnings.push(warning.to_owned());
     }
     found
+}
+
+/// The solution of a minimum, and whether the belt is open and held at two places or more.
+fn solved_minimum(found: &Equilibrium) -> Option<(&Solved, bool)> {
+    let solved = found.solved.as_ref().filter(|_| found.is_minimum())?;
+    let is_open = solved.program.half_turns.is_none();
+    Some((solved, is_open && held_nodes(&solved.program).len() > 1))
+}
+
+/// The minimum next to the shape into which a load per unit length pushes a minimum along the bulge.
+fn pushed_over(
+    problem: &Problem,
+    solved: &Solved,
+    push: f64,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Equilibrium {
+    let search = Search::of(problem);
+    let mut program = solved.program.clone();
+    let [_, across] = along_and_across(&program, &solved.at.point, &problem.bulge());
+    program.weight += push * across;
+    let point = solved.at.point.clone();
+    let pushed = search.only_from(&program, point, search.settings.warm_barrier, proceed);
+    let mesh = Mesh::of(problem, &program);
+    solve(problem, Start::Minimum(&mesh, &pushed.at.point), proceed)
 }
 
 /// A mirror that takes a belt to a belt: the frames, as columns, from R to Q R S. Q is the mirror of space, S the mirror of
@@ -223,12 +292,7 @@ impl Mirror {
         point: &BeltPoint,
         bulge: &Vector3<f64>,
     ) -> Matrix3<f64> {
-        let held = held_nodes(program);
-        let [from, to] = [held.first(), held.last()].map(|node| *node.unwrap_or(&0));
-        let chord = point.poses[to].position - point.poses[from].position;
-        let tangent = || point.poses[from].frame.column(1).into_owned();
-        let along = chord.try_normalize(f64::EPSILON).unwrap_or_else(tangent);
-        let square = (bulge - along * along.dot(bulge)).normalize();
+        let [along, square] = along_and_across(program, point, bulge);
         let third = along.cross(&square);
         let determinant = self.of_frame().determinant();
         let sense = if self.backwards { -1.0 } else { 1.0 };
@@ -236,6 +300,21 @@ impl Mirror {
             - square * square.transpose()
             - sense * determinant * third * third.transpose()
     }
+}
+
+/// The unit vectors along the chord between the held places, and along the bulge square to it.
+fn along_and_across(
+    program: &BeltProgram,
+    point: &BeltPoint,
+    bulge: &Vector3<f64>,
+) -> [Vector3<f64>; 2] {
+    let held = held_nodes(program);
+    let [from, to] = [held.first(), held.last()].map(|node| *node.unwrap_or(&0));
+    let chord = point.poses[to].position - point.poses[from].position;
+    let tangent = || point.poses[from].frame.column(1).into_owned();
+    let along = chord.try_normalize(f64::EPSILON).unwrap_or_else(tangent);
+    let square = (bulge - along * along.dot(bulge)).normalize();
+    [along, square]
 }
 
 /// The node nearest to the place with which a node's place is exchanged if start and end are.
@@ -273,6 +352,8 @@ fn place(program: &BeltProgram, shape: &mut BeltPoint, other: &BeltPoint) {
 struct Image {
     /// Whether start and end are exchanged.
     is_backwards: bool,
+    /// Whether left-handed belts become right-handed.
+    changes_hand: bool,
     shape: BeltPoint,
     /// Its miss of the supports, lengths in U and angles in rad.
     miss: f64,
@@ -283,39 +364,54 @@ struct Image {
 impl Image {
     /// The images of a shape on the side of the bulge: twins first, then those that miss the supports least.
     fn all(problem: &Problem, solved: &Solved) -> Vec<Self> {
-        /// Relative difference of the energies of mirror images, by rounding and by a mesh that is not symmetric.
-        const LEVEL: f64 = 1e-3;
-        let Solved { program, at, .. } = solved;
-        let bulge = problem.bulge();
-        let (nodes, held) = (program.nodes(), held_nodes(program));
-        let energy = |shape: &BeltPoint| {
-            program.elastic_energy(&shape.fields) + program.load_potential(&shape.poses)
-        };
-        let own = energy(&at.point);
-        let image = |mirror: Mirror| {
-            let shape = mirror.image(program, &at.point, &bulge);
-            let miss = program.miss_of_supports(&shape);
-            let is_level = (energy(&shape) - own).abs() <= LEVEL * own.abs();
-            Self {
-                is_backwards: mirror.backwards,
-                is_twin: miss <= MET && is_level,
-                shape,
-                miss,
-            }
-        };
-        let is_right = |image: &Self| {
-            let distance = mean_distance(&nodes, &image.shape.poses, &held);
-            side(distance.dot(&bulge.normalize())) > 0
-        };
-        let is_twisted = program.half_turns.is_some_and(|half_turns| half_turns != 0);
-        let mirrors = Mirror::all(program.half_turns.is_some());
-        let mirrors = mirrors.filter(|mirror| !(is_twisted && mirror.changes_hand()));
-        let mut images: Vec<_> = mirrors.map(image).filter(is_right).collect();
+        let bulge = problem.bulge().normalize();
+        let is_right = |image: &Self| side(image.mean_distance(&solved.program).dot(&bulge)) > 0;
+        let mut images: Vec<_> = Self::of_mirrors(solved, &bulge).filter(is_right).collect();
         // Rounding must not choose between twins.
         let rank = |image: &Self| if image.is_twin { 0.0 } else { image.miss };
         images.sort_by(|a, b| rank(a).total_cmp(&rank(b)));
         images.dedup_by(|b, a| a.shape.distance(&b.shape) <= MET);
         images
+    }
+
+    /// Whether a belt bulges to some side, and has a twin that bulges to the opposite one.
+    fn has_opposite_twin(found: &Equilibrium, solved: &Solved) -> bool {
+        let own = found.mean_distance();
+        let is_opposite = |image: &Self| {
+            image.is_twin && image.mean_distance(&solved.program).dot(&own) < -BULGES * own.norm()
+        };
+        own.norm() > BULGES && Self::of_mirrors(solved, &own).any(|image| is_opposite(&image))
+    }
+
+    /// The images of a shape by all mirrors that keep the half turns of a closed belt.
+    fn of_mirrors(solved: &Solved, bulge: &Vector3<f64>) -> impl Iterator<Item = Self> {
+        /// Relative difference of the energies of mirror images, by rounding and by a mesh that is not symmetric.
+        const LEVEL: f64 = 1e-3;
+        let Solved { program, at, .. } = solved;
+        let energy = |shape: &BeltPoint| {
+            program.elastic_energy(&shape.fields) + program.load_potential(&shape.poses)
+        };
+        let own = energy(&at.point);
+        let is_twisted = program.half_turns.is_some_and(|half_turns| half_turns != 0);
+        let mirrors = Mirror::all(program.half_turns.is_some());
+        let mirrors = mirrors.filter(move |mirror| !(is_twisted && mirror.changes_hand()));
+        mirrors.map(move |mirror| {
+            let shape = mirror.image(program, &at.point, bulge);
+            let miss = program.miss_of_supports(&shape);
+            let is_level = (energy(&shape) - own).abs() <= LEVEL * own.abs();
+            Self {
+                is_backwards: mirror.backwards,
+                changes_hand: mirror.changes_hand(),
+                is_twin: miss <= MET && is_level,
+                shape,
+                miss,
+            }
+        })
+    }
+
+    /// Mean distance from the chords, in U.
+    fn mean_distance(&self, program: &BeltProgram) -> Vector3<f64> {
+        mean_distance(&program.nodes(), &self.shape.poses, &held_nodes(program))
     }
 
     /// The minimum at the image of a minimum.
@@ -342,6 +438,12 @@ impl Image {
         solved: &Solved,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Equilibrium {
+        if is_slender_on_graded_mesh(problem)
+            && let Some(found) =
+                slender_minimum_near(problem, &solved.program, &self.shape, proceed)
+        {
+            return found;
+        }
         let program = problem.program(problem.elements());
         let shape = prolong(&solved.program, &self.shape, &program);
         minimum_from(problem, &shape, proceed)

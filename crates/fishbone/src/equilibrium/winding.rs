@@ -1,5 +1,6 @@
 //! Supports that are turned by more than half a turn: the belt is followed there from less.
 
+use super::side::wound_on_side_of_bulge;
 use super::{Equilibrium, Status, beside_the_guess, minimum_next_to, of_solution};
 use crate::problem::program::BeltProgram;
 use crate::problem::{Mesh, Problem, number};
@@ -26,7 +27,7 @@ pub(super) fn wound(
         return None;
     }
     if let Some(found) = Way::new(problem, angle).and_then(|way| way.end(problem, proceed)) {
-        return Some(found);
+        return Some(wound_on_side_of_bulge(found, proceed));
     }
     let mut found = beside_the_guess(problem, proceed);
     if found.status == Status::Converged {
