@@ -152,3 +152,14 @@ def test_opposite_moments_at_two_hinges_roll_up_a_belt_between_pins() -> None:
     found = solve(board([straight(1.0)], ends, elements=80))
     assert found.bend == pytest.approx(np.full_like(found.u, 2.0 * angle), rel=1e-5)
     assert found.reaction("end").force == pytest.approx([0.0, 0.0, 0.0], abs=1e-4)
+
+
+@pytest.mark.parametrize("angle", [TAU, -TAU])
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_whole_turn_about_any_axis_rolls_up_a_free_end(axis: int, angle: float) -> None:
+    """The least energy of a belt that has kept an odd number of whole turns is that of a circle."""
+    rotation = [0.0, 0.0, 0.0]
+    rotation[axis] = angle
+    found = solve(belt([support("start", ORIGIN, ORIGIN), support("end", None, rotation)]))
+    assert found.stable
+    assert found.energy == pytest.approx(0.5 * TAU**2, rel=1e-4)

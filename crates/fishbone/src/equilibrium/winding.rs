@@ -2,10 +2,12 @@
 
 use super::side::wound_on_side_of_bulge;
 use super::{Equilibrium, Status, beside_the_guess, minimum_next_to, of_solution};
-use crate::problem::program::BeltProgram;
+use crate::problem::program::{BeltProgram, Hold, Piece};
 use crate::problem::{Mesh, Problem, number};
-use stagewise::{FollowSettings, Follower};
+use nalgebra::{Rotation3, UnitQuaternion, Vector3};
+use stagewise::{Distance, FollowSettings, Follower};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::iter;
 use std::ops::ControlFlow;
 
 /// Angle from which a rotation vector is more than half a turn, in rad: half turns may be given with few decimals.
@@ -26,8 +28,10 @@ pub(super) fn wound(
     if !(MORE_THAN_HALF..=MOST).contains(&angle) {
         return None;
     }
-    if let Some(found) = Way::new(problem, angle).and_then(|way| way.end(problem, proceed)) {
-        return Some(wound_on_side_of_bulge(found, proceed));
+    for way in Way::all(problem, angle) {
+        if let Some(found) = way.end(problem, proceed) {
+            return Some(wound_on_side_of_bulge(found, proceed));
+        }
     }
     let mut found = beside_the_guess(problem, proceed);
     if found.status == Status::Converged {
@@ -44,22 +48,41 @@ pub(super) fn wound(
 struct Way {
     /// The problem at the end, on the mesh of the way.
     goal: Problem,
-    /// The largest angle at the end, in rad.
+    /// The largest angle of the problem, in rad.
     angle: f64,
+    /// The angle at the end, in rad: the largest angle, or one that is two whole turns less.
+    end: f64,
 }
 
 impl Way {
-    /// The way to a problem; `None` where its mesh cannot be as fine as the way needs.
-    fn new(problem: &Problem, angle: f64) -> Option<Self> {
+    /// The ways to a problem, the one asked for first. From a whole turn on a single support may also turn the other way round
+    /// by two whole turns less: a belt undoes two whole turns as it passes round its end. None where the mesh cannot be as fine
+    /// as they need.
+    fn all(problem: &Problem, angle: f64) -> Vec<Self> {
         /// Turn of an element of the mesh, if the belt turns evenly, in rad.
         const TURN: f64 = 0.1;
+        /// Angle by which a whole turn may be less for want of decimals, in rad.
+        const DECIMALS: f64 = 1e-3;
         let least = (angle / TURN).ceil() as usize;
         let elements = match problem.has_fixed_mesh() {
             true => problem.elements(),
             false => problem.elements().max(least),
         };
-        let goal = problem.with_elements(elements).ok()?;
-        Some(Self { goal, angle })
+        let Ok(goal) = problem.with_elements(elements) else {
+            return Vec::new();
+        };
+        let rotations = problem.scenario().supports.iter();
+        let rotations = rotations.filter_map(|support| support.rotation);
+        let wound = rotations.filter(|r| Vector3::from(*r).norm() > MORE_THAN_HALF);
+        let other = (wound.count() == 1 && angle >= TAU - DECIMALS).then_some(angle - 2.0 * TAU);
+        let other = other.filter(|end| *end < -BEGIN);
+        let ends = iter::once(angle).chain(other);
+        ends.map(|end| Self {
+            goal: goal.clone(),
+            angle,
+            end,
+        })
+        .collect()
     }
 
     /// The problem on the way at which the largest angle is another.
@@ -77,13 +100,17 @@ impl Way {
         const LEG: f64 = 0.5;
         /// Displacement up to which the refined minimum is the same, in U.
         const SAME: f64 = 0.1;
-        let legs = ((self.angle - BEGIN) / LEG).ceil();
-        let place = |leg: f64| BEGIN + (self.angle - BEGIN) * leg / legs;
-        let mut found = beside_the_guess(&self.at(BEGIN), proceed);
+        let (begin, mut found) = self.begin(proceed)?;
+        let legs = ((self.end - begin).abs() / LEG).ceil();
+        let place = |leg: f64| begin + (self.end - begin) * leg / legs;
+        let turns = parities(&found);
         let mut has_snapped = false;
         for leg in 1..=legs as usize {
             let ends = [leg - 1, leg].map(|leg| place(leg as f64));
             has_snapped |= self.go_on(&mut found, ends, proceed)?;
+            if parities(&found) != turns {
+                return None;
+            }
         }
         let iterations = found.iterations;
         let refined = found.refined_for(problem, proceed);
@@ -107,6 +134,25 @@ impl Way {
         Some(end)
     }
 
+    /// The angle at which the way begins and a minimum there; of a straight board one that turns by this angle, and not the
+    /// longer way round. `None` where there is none.
+    fn begin(&self, proceed: &mut dyn FnMut() -> ControlFlow<()>) -> Option<(f64, Equilibrium)> {
+        /// Shares of the angle of the beginning that are tried, dimensionless.
+        const SHARES: [f64; 2] = [1.0, 0.2];
+        let program = self.goal.program(self.goal.elements());
+        let is_straight = program.pieces.iter().all(|piece| match piece {
+            Piece::Strip(element) => element.geodesic == 0.0,
+            Piece::Rigid { .. } => true,
+            Piece::Joint { .. } => false,
+        });
+        let angles = SHARES.map(|share| share * BEGIN.copysign(self.end));
+        angles.into_iter().find_map(|begin| {
+            let found = beside_the_guess(&self.at(begin), proceed);
+            let is_right = !is_straight || parities(&found).iter().all(|is_alike| *is_alike);
+            (found.status == Status::Converged && is_right).then_some((begin, found))
+        })
+    }
+
     /// Follows a minimum from one angle to another, and gives whether it has snapped on the way; `None` where it is lost.
     fn go_on(
         &self,
@@ -116,6 +162,8 @@ impl Way {
     ) -> Option<bool> {
         let solved = found.certified().ok()?;
         let mesh = Mesh::of(&self.goal, &solved.program);
+        /// Displacement beyond which the next minimum is another one, in U.
+        const ANOTHER: f64 = 0.05;
         let settings = FollowSettings {
             tolerance: self.goal.tolerance(),
             smallest_jump: 2e-3,
@@ -129,12 +177,55 @@ impl Way {
         let followed = follower.follow(to - from, &mut change, proceed);
         let (problem, program) = (self.at(to), follower.program().clone());
         let fault = problem.active_set_fault(&program, follower.point());
+        let before = follower.point().clone();
         let mut next = match followed.arrived && fault.is_none() {
             true => of_solution(&problem, program, follower.solution()),
             false => minimum_next_to(&problem, follower.point(), proceed),
         };
         next.iterations += found.iterations + followed.iterations;
         *found = next;
-        (found.status == Status::Converged).then_some(followed.jump > 0.0)
+        let after = found.certified().ok()?;
+        Some(followed.jump > 0.0 || after.at.point.distance(&before) > ANOTHER)
     }
+}
+
+/// Whether the belt turns from one held frame to the next by the rotation between them, and not by a whole turn more or less:
+/// one for each pair of frames. A belt that turns along a way keeps them, unless it passes beyond any belt on the way.
+///
+/// A rotation and a whole turn more are two unit quaternions of opposite sign; those of the supports have the signs of their
+/// rotation vectors, and those of the belt are continuous along it.
+fn parities(found: &Equilibrium) -> Vec<bool> {
+    let Ok(solved) = found.certified() else {
+        return Vec::new();
+    };
+    let frame = |node: usize| {
+        let frame = Rotation3::from_matrix_unchecked(solved.at.point.poses[node].frame);
+        UnitQuaternion::from_rotation_matrix(&frame)
+    };
+    let held = solved
+        .program
+        .supports
+        .iter()
+        .zip(&found.scenario().supports);
+    let held = held.filter(|(support, _)| matches!(support.hold, Hold::Frame(_)));
+    let held = held.filter_map(|(support, given)| {
+        let turn = UnitQuaternion::from_scaled_axis(Vector3::from(given.rotation?));
+        Some((support.node, turn))
+    });
+    let held: Vec<_> = held.collect();
+    let is_alike = |ends: &[(usize, UnitQuaternion<f64>)]| {
+        let [(from, start), (to, end)] = [ends[0], ends[1]];
+        let step = |k: usize| {
+            let step = frame(k).conjugate() * frame(k + 1);
+            if step.w < 0.0 {
+                UnitQuaternion::new_unchecked(-step.into_inner())
+            } else {
+                step
+            }
+        };
+        let along = (from..to).map(step);
+        let along = along.fold(UnitQuaternion::identity(), |turned, step| turned * step);
+        along.dot(&(start.conjugate() * end)) > 0.0
+    };
+    held.windows(2).map(is_alike).collect()
 }
