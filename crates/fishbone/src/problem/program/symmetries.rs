@@ -15,12 +15,12 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
     /// Motions that keep energy, supports, links and obstacles: those twists of the whole belt, with sliding along itself
     /// where it may slide, along which all conditions stay as they are to first order.
     ///
-    /// Conditions whose rank is the same nearby leave a family of shapes of the same energy. Of others it is not known
-    /// whether they stay as they are beyond first order, and no motion counts as a symmetry.
+    /// Conditions whose rank is the same nearby leave a family of shapes of the same energy. Of others, as of pins on a line
+    /// about which the belt may turn, a motion counts as a symmetry if all conditions stay as they are far along it.
     pub(super) fn find_symmetries(&self, point: &BeltPoint<F>) -> Vec<Motion<N>> {
-        let kept = self.kept(point);
-        if kept.is_empty() || self.kept(&elsewhere(point)).len() != kept.len() {
-            return Vec::new();
+        let mut kept = self.kept(point);
+        if !kept.is_empty() && self.kept(&elsewhere(point)).len() != kept.len() {
+            kept.retain(|parts| self.keeps_all_along(point, parts));
         }
         let sliding = self.sliding(point);
         let motion = |parts: &DVector<f64>| {
@@ -62,6 +62,41 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
             .zip(eigen.eigenvectors.column_iter());
         let kept = pairs.filter(|(square, _)| **square <= KEPT);
         kept.map(|(_, vector)| vector.into_owned()).collect()
+    }
+
+    /// Whether supports, links, obstacles and the potential of loads stay as they are as the whole belt turns far by a twist; not
+    /// known of a motion that slides along the belt too.
+    fn keeps_all_along(&self, point: &BeltPoint<F>, parts: &DVector<f64>) -> bool {
+        /// Amounts of the twist, of which the conditions know no period, in rad and U.
+        const AMOUNTS: [f64; 3] = [0.4, 1.1, -0.7];
+        /// Change of a condition by rounding; lengths in U, angles in rad and energy in mean R_f/U.
+        const ROUNDING: f64 = 1e-7;
+        let slides = parts.iter().skip(6).any(|part| part.abs() > ROUNDING);
+        let twist = Vector6::from_column_slice(&parts.as_slice()[..6]);
+        let size = 1.0 + self.total_load();
+        let conditions = |point: &BeltPoint<F>| {
+            let supports = self.supports.iter();
+            let supports = supports.map(|support| support.value(&point.poses[support.node]));
+            let links = self.links.iter().map(|link| link.value(point));
+            let obstacles = self.obstacles.iter();
+            let obstacles = obstacles.map(|o| o.gap(&point.poses[o.node]));
+            let rows = supports.chain(links);
+            let rows = rows.flat_map(|rows| rows.iter().copied().collect::<Vec<_>>());
+            let potential = self.load_potential(&point.poses) / size;
+            let all = rows.chain(obstacles).chain([potential]);
+            all.collect::<Vec<f64>>()
+        };
+        let own = conditions(point);
+        let is_kept = |amount: f64| {
+            let by = Pose::exp(&Twist::from_vector(&(amount * twist)));
+            let moved = conditions(&moved(point, by));
+            let mut changes = own
+                .iter()
+                .zip(moved)
+                .map(|(own, moved)| (own - moved).abs());
+            changes.all(|change| change <= ROUNDING)
+        };
+        !slides && AMOUNTS.into_iter().all(is_kept)
     }
 
     /// Changes of the conditions along the six twists, then along sliding. Of a load the condition is that its force keeps
@@ -186,6 +221,11 @@ fn elsewhere<const F: usize>(point: &BeltPoint<F>) -> BeltPoint<F> {
         translation: Vector3::new(0.05, -0.03, 0.02),
         rotation: Vector3::new(0.2, -0.3, 0.1),
     });
+    moved(point, by)
+}
+
+/// The same shape moved as a whole.
+fn moved<const F: usize>(point: &BeltPoint<F>, by: Pose) -> BeltPoint<F> {
     BeltPoint {
         fields: point.fields.clone(),
         poses: point.poses.iter().map(|pose| by * *pose).collect(),
