@@ -25,6 +25,27 @@ pub(super) fn decide(
     tolerance: f64,
     at: &Stationary<BeltPoint>,
 ) -> Option<Stability> {
+    proof(program, tolerance, at).map(|proof| proof.stability)
+}
+
+/// The stationary point with flat parts with slopes of their ribs that, held, leave a direction in which the energy falls;
+/// `None` of a point that is not known to be unstable.
+pub(super) fn unstable_slopes(
+    program: &BeltProgram,
+    tolerance: f64,
+    at: &Stationary<BeltPoint>,
+) -> Option<Stationary<BeltPoint>> {
+    proof(program, tolerance, at)?.falls_from
+}
+
+/// A proof that a stationary point with flat parts is stable, or not.
+struct Proof {
+    stability: Stability,
+    /// The point with slopes of the ribs that, held, leave a direction in which the energy falls; `None` where it is stable.
+    falls_from: Option<Stationary<BeltPoint>>,
+}
+
+fn proof(program: &BeltProgram, tolerance: f64, at: &Stationary<BeltPoint>) -> Option<Proof> {
     let inside = program.flat_nodes(&at.point);
     if curls(program, &inside) {
         return None;
@@ -43,7 +64,10 @@ pub(super) fn decide(
             .inertia
             .filter(|_| found.outcome == Outcome::Converged)?;
         if inertia.negative + inertia.zero == 0 {
-            return Some(inertia.into());
+            return Some(Proof {
+                stability: inertia.into(),
+                falls_from: None,
+            });
         }
         let modes = lowest_modes(&bound, &mut bounded, 1).ok()?;
         let along = Along::of(&bound, &slopes, modes.first()?);
@@ -55,10 +79,15 @@ pub(super) fn decide(
         }
         for reach in [half_width, f64::INFINITY] {
             let signed = along.signed(&slopes, &inside, reach);
-            let slanted = slanted(program, at, &inside, &signed);
-            let falls = slanted.and_then(|at| assess(program, tolerance, &at).inertia);
-            if let Some(inertia) = falls.filter(|inertia| inertia.negative > 0) {
-                return Some(inertia.into());
+            let Some(slanted) = slanted(program, at, &inside, &signed) else {
+                continue;
+            };
+            let inertia = assess(program, tolerance, &slanted).inertia;
+            if let Some(inertia) = inertia.filter(|inertia| inertia.negative > 0) {
+                return Some(Proof {
+                    stability: inertia.into(),
+                    falls_from: Some(slanted),
+                });
             }
         }
     }

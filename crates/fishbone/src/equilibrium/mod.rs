@@ -2,6 +2,7 @@
 
 mod accuracy;
 mod active_set;
+mod buckled;
 mod flat;
 pub(crate) mod guess;
 mod intrinsic;
@@ -388,6 +389,7 @@ fn beside_the_guess(
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Equilibrium {
     let found = intrinsic::solve(problem, Start::Guess, proceed);
+    let found = buckled::out_of_flat(found, proceed);
     side::on_side_of_bulge(with_half_turns(found, proceed), proceed)
 }
 
