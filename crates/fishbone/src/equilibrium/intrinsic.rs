@@ -361,15 +361,11 @@ fn warnings(
     stability: Option<Stability>,
     is_flat: bool,
 ) -> Vec<String> {
-    /// Thickness from which a belt is no thin strip, in V.
-    const THICK: f64 = 0.25;
     let scenario = problem.scenario();
     let no_slack = status == Status::NotConverged && problem.has_no_slack();
     let flat = status == Status::Converged && is_flat && stability.is_none();
     let weightless = scenario.loads.gravity.is_some_and(|g| g != [0.0; 3])
         && scenario.belt.density_value() == 0.0;
-    let thick = scenario.belt.thickness();
-    let thick = thick.filter(|thickness| *thickness > THICK * scenario.belt.width);
     let saddle = stability.and_then(|s| s.is_stable()) == Some(false);
     let turned = scenario
         .supports
@@ -382,13 +378,6 @@ fn warnings(
         }),
         weightless.then(|| {
             "gravity acts on no mass: give belt.density, or that of its material or layers".to_owned()
-        }),
-        thick.map(|thickness| {
-            format!(
-                "a belt {} thick and {} wide is no thin strip: thicknesses are in the unit of length of the rest",
-                number(thickness),
-                number(scenario.belt.width)
-            )
         }),
         flat.then(|| {
             "a part of the loaded belt has stayed flat: whether it would rather buckle could not be told".to_owned()
