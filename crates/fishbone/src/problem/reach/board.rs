@@ -1,6 +1,7 @@
 //! Distances on the flat board.
 
 use crate::scenario::{BeltSpec, SAME_PLACE, SegmentSpec};
+use nalgebra::Vector2;
 
 /// A point of the flat board.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,7 +21,7 @@ struct Stretch {
 
 /// An upper bound of the length of the shortest path on the board from one point to another: the length of the straight line
 /// where the board between them is straight, else of the shortest of the paths along the spine or an edge and along the two
-/// square ribs.
+/// square ribs, and of the path from mitre to mitre across a board of straight stretches and corners.
 ///
 /// On a closed belt the path goes the shorter way round; the points must be on the spine.
 pub(super) fn distance([a, b]: [BoardPoint; 2], belt: &BeltSpec) -> f64 {
@@ -40,7 +41,65 @@ pub(super) fn distance([a, b]: [BoardPoint; 2], belt: &BeltSpec) -> f64 {
         let along = offset_length(&stretches, edge)?;
         Some((a.v - edge).abs() + along + (b.v - edge).abs())
     });
-    by_edge.fold(a.v.abs() + way + b.v.abs(), f64::min)
+    let ends = if a.u <= b.u { [a.v, b.v] } else { [b.v, a.v] };
+    let across = across_corners(&stretches, ends, half);
+    let paths = by_edge.chain(across);
+    paths.fold(a.v.abs() + way + b.v.abs(), f64::min)
+}
+
+/// A mitre: the points of the board at a corner, by their distance from the spine.
+struct Mitre {
+    /// The corner of the spine.
+    corner: Vector2<f64>,
+    /// Place of a point of the mitre off the corner, per distance from the spine.
+    along: Vector2<f64>,
+}
+
+/// Length of a path from mitre to mitre across a board of straight stretches and corners, between points off its first and
+/// its last square rib; `None` of a board with arcs, with a corner at its start, or with mitres that meet.
+///
+/// Parts of the board between two mitres are convex, so that the path is straight there. It is the shortest path once every
+/// point on a mitre is where the line between its neighbours crosses the mitre, or on the edge next to that. The points are
+/// moved there in turn; every such path is on the board.
+fn across_corners(stretches: &[Stretch], ends: [f64; 2], half: f64) -> Option<f64> {
+    /// Rounds over all mitres, a number.
+    const ROUNDS: usize = 50;
+    let cuts = |stretch: &Stretch| half * (0.5 * stretch.corner).tan().abs();
+    let after = stretches.iter().skip(1).map(cuts).chain([0.0]);
+    let mut legs = stretches.iter().zip(after);
+    let is_convex =
+        |(leg, after): (&Stretch, f64)| leg.curvature == 0.0 && leg.length >= cuts(leg) + after;
+    if stretches.first()?.corner != 0.0 || !legs.all(is_convex) {
+        return None;
+    }
+    let normal = |heading: f64| Vector2::new(-heading.sin(), heading.cos());
+    let (mut at, mut heading) = (Vector2::zeros(), 0.0f64);
+    let first = at + ends[0] * normal(heading);
+    let mut mitres = Vec::new();
+    for stretch in stretches {
+        if stretch.corner != 0.0 {
+            let normals = normal(heading) + normal(heading + stretch.corner);
+            mitres.push(Mitre {
+                corner: at,
+                along: normals / (1.0 + stretch.corner.cos()),
+            });
+            heading += stretch.corner;
+        }
+        at += stretch.length * Vector2::new(heading.cos(), heading.sin());
+    }
+    let last = at + ends[1] * normal(heading);
+    let corners = mitres.iter().map(|mitre| mitre.corner);
+    let mut path: Vec<_> = [first].into_iter().chain(corners).chain([last]).collect();
+    for _ in 0..ROUNDS {
+        for (k, mitre) in mitres.iter().enumerate() {
+            let (before, chord) = (path[k], path[k + 2] - path[k]);
+            let v = (before - mitre.corner).perp(&chord) / mitre.along.perp(&chord);
+            if v.is_finite() {
+                path[k + 1] = mitre.corner + v.clamp(-half, half) * mitre.along;
+            }
+        }
+    }
+    Some(path.windows(2).map(|ends| (ends[1] - ends[0]).norm()).sum())
 }
 
 /// The stretches between two arc lengths in rising order. A support at a corner holds the frame before it.
@@ -124,6 +183,33 @@ mod tests {
         assert!((inner - 0.9 * FRAC_PI_2).abs() < 1e-12);
         let spine = between([0.0, 0.0], [FRAC_PI_2, 0.0], &belt);
         assert!((spine - FRAC_PI_2).abs() < 1e-12);
+    }
+
+    #[test]
+    fn test_way_across_a_corner_is_straight_or_touches_its_inner_edge() {
+        let bent = |angle: f64| {
+            let legs = [0.5, 0.5].map(SegmentSpec::straight);
+            let turn = SegmentSpec::Corner { angle };
+            between(
+                [0.0, 0.0],
+                [1.0, 0.0],
+                &belt(vec![legs[0].clone(), turn, legs[1].clone()]),
+            )
+        };
+        for sign in [1.0, -1.0] {
+            // Half the width is 0.1: the chord passes the corner at 0.5 sin(angle/2).
+            assert!((bent(0.2 * sign) - 0.1f64.cos()).abs() < 1e-12);
+            let to_edge = (0.5 - 0.1 * 0.5f64.tan()).hypot(0.1);
+            assert!((bent(sign) - 2.0 * to_edge).abs() < 1e-12);
+        }
+        // Bends to and fro: the ends are on a line.
+        let bends = [0.25, -0.5, 0.5, -0.25].map(|angle| SegmentSpec::Corner { angle });
+        let mut segments = vec![SegmentSpec::straight(0.1)];
+        for (bend, length) in bends.into_iter().zip([0.2, 0.4, 0.2, 0.1]) {
+            segments.extend([bend, SegmentSpec::straight(length)]);
+        }
+        let straight = 0.2 + 0.8 * 0.25f64.cos();
+        assert!((between([0.0, 0.0], [1.0, 0.0], &belt(segments)) - straight).abs() < 1e-9);
     }
 
     #[test]
