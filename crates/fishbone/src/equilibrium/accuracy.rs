@@ -1,10 +1,11 @@
 //! The error that the mesh makes, estimated by one Newton step on the mesh of elements half as long.
 
-use super::refinement::ribs_turn;
+use super::refinement::{PER_WIDTH, ribs_turn};
 use super::search::{Search, prolonged, prolonged_with_multipliers};
 use crate::problem::program::{BeltPoint, BeltProgram, Piece, Undetermined};
 use crate::problem::{Mesh, Problem};
 use crate::scenario::SAME_PLACE;
+use crate::strip::element::Element;
 use crate::strip::spine::Spine;
 use crate::surface::least_spine_radius;
 use nalgebra::Vector3;
@@ -117,9 +118,10 @@ impl Estimate {
         let step = stagewise::correct(&fine, tolerance(problem), near.clone())?;
         let mut better = (step.point, step.equalities, step.objective);
         let mut error = own.off_on(problem, &fine, &better);
-        // A density that does not know the width lets ribs turn over anywhere at no cost, and one step does not move the
-        // place from element to element.
-        let may_turn_over = !program.model.knows_width() && error.largest() <= problem.accuracy();
+        // A density that does not know the width lets ribs turn over anywhere at no cost, and elements much longer than the
+        // width hold ribs wherever they turn: one step does not move the place from element to element.
+        let may_turn_elsewhere = !program.model.knows_width() || turns_coarsely(program, &at.point);
+        let may_turn_elsewhere = may_turn_elsewhere && error.largest() <= problem.accuracy();
         if ribs_meet || error.largest() > most {
             let solution = solved_near(problem, &fine, &near, proceed);
             if let Some(solution) = solution.filter(|found| is_next_to(found, &here)) {
@@ -127,7 +129,7 @@ impl Estimate {
                 better = (point, multipliers.equalities, solution.values.objective);
                 error = own.off_on(problem, &fine, &better);
             }
-        } else if may_turn_over {
+        } else if may_turn_elsewhere {
             let finest = problem.program_on(&mesh.split(&parts(program, &at.point)))?;
             let here = prolonged(program, &at.point, &finest);
             let solution = searched_near(problem, &finest, &here, proceed);
@@ -172,10 +174,25 @@ impl Estimate {
     }
 }
 
-/// Parts of every element of a mesh on which ribs would turn over elsewhere, if that had less energy: four where ribs turn,
-/// as elements half as long may hold them in the same place, and two elsewhere.
+/// Whether ribs turn in an element that is longer than the belt is wide.
+fn turns_coarsely(program: &BeltProgram, at: &BeltPoint) -> bool {
+    let mut elements = program.elements();
+    elements.any(|element| ribs_turn(at, element) && element.1.length > 2.0 * element.1.half_width)
+}
+
+/// Parts of every element of a mesh on which ribs would turn elsewhere, if that had less energy: where they turn at least
+/// four, as elements half as long may hold them in the same place, and so many that they are short beside the width; two
+/// elsewhere.
 fn parts(program: &BeltProgram, at: &BeltPoint) -> Vec<usize> {
-    let parts = |element| if ribs_turn(at, element) { 4 } else { 2 };
+    /// Parts where ribs turn, at least and at most.
+    const TURNING: [usize; 2] = [4, 64];
+    let parts = |(k, element): (usize, &Element)| match ribs_turn(at, (k, element)) {
+        true => {
+            let wanted = PER_WIDTH * element.length / (2.0 * element.half_width);
+            (wanted.ceil() as usize).clamp(TURNING[0], TURNING[1])
+        }
+        false => 2,
+    };
     program.elements().map(parts).collect()
 }
 

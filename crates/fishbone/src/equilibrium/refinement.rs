@@ -10,7 +10,9 @@ use crate::problem::{Mesh, Problem};
 use crate::scenario::SAME_PLACE;
 use crate::strip::element::Element;
 use slender::narrowed;
-pub(super) use slender::{is_slender, mesh_about_ribs, mesh_for_ribs_anywhere, ribs_turn};
+pub(super) use slender::{
+    PER_WIDTH, is_slender, mesh_about_ribs, mesh_for_ribs_anywhere, ribs_turn,
+};
 use stagewise::{Distance, Outcome, Solution};
 use std::ops::ControlFlow;
 
@@ -461,7 +463,7 @@ impl Level {
                     false => f64::INFINITY,
                 };
                 let by_ribs = match ribs_turn(&self.solution.at.point, (k, element)) {
-                    true => 2.0 * element.half_width / (slender::PER_WIDTH * element.length),
+                    true => 2.0 * element.half_width / (PER_WIDTH * element.length),
                     false => f64::INFINITY,
                 };
                 let factor = by_gain.min(by_turn).min(by_radius).min(by_ribs);

@@ -10,7 +10,7 @@ use crate::strip::element::Element;
 use std::ops::ControlFlow;
 
 /// Elements for each width V where ribs turn, a number: longer ones may settle on a false level.
-pub(super) const PER_WIDTH: f64 = 8.0;
+pub(in crate::equilibrium) const PER_WIDTH: f64 = 8.0;
 
 /// A stretch along which ribs turn.
 #[derive(Debug, Clone, Copy)]
