@@ -81,11 +81,22 @@ def test_error_of_a_board_that_is_all_but_flat_is_not_known_and_of_a_flat_one_no
     assert len(flat.u) < 200
 
 
-@pytest.mark.parametrize("lift", [1e-3, 1e-4])
-def test_clamped_arc_has_the_energy_of_a_larger_lift_in_proportion(lift: float) -> None:
-    near, far = fb.solve(_clamped(lift)), fb.solve(_clamped(5e-3))
+@pytest.mark.parametrize("lift", [1e-3, 1e-4, 1e-5, 1e-6, 1e-7])
+@pytest.mark.parametrize("held", ["pose", "position", "height and rotation"])
+def test_arc_held_in_its_plane_has_the_energy_and_force_of_a_larger_lift_in_proportion(held: str, lift: float) -> None:
+    """The plane shortens it by the square of the lift, which at 1e-7 is 50 roundings of a position."""
+
+    def solved(height: float) -> fb.Equilibrium:
+        position = [height, "free", "free"] if held == "height and rotation" else [height, *END[1:]]
+        turn = {} if held == "position" else {"rotation": [math.pi / 2, 0.0, 0.0]}
+        return fb.solve(_arc({"position": position} | turn))
+
+    near, far = solved(lift), solved(5e-3)
     assert near.status == far.status == "converged"
+    assert near.stable
     assert near.energy / lift**2 == pytest.approx(far.energy / 5e-3**2, rel=1e-3)
+    if lift >= 1e-6:
+        assert near.reaction("end").force[0] == pytest.approx(2.0 * near.energy / lift, rel=2e-3)
 
 
 @pytest.mark.parametrize("slack", [1e-6, 1e-8])
@@ -119,7 +130,7 @@ def test_path_leads_an_arc_off_the_plane() -> None:
 
 @pytest.mark.parametrize("energy", get_args(EnergyModel))
 @pytest.mark.parametrize(
-    ("curvature", "width"), [(2.0, 0.3), (2.0, 0.2), (4.0, 0.05), (4.0, 0.1), (6.0, 0.03), (6.0, 0.1)]
+    ("curvature", "width"), [(2.0, 0.3), (2.0, 0.2), (4.0, 0.05), (4.0, 0.1), (6.0, 0.03), (6.0, 0.1), (2.0, 0.5)]
 )
 def test_unloaded_flat_arc_is_stable(energy: EnergyModel, curvature: float, width: float) -> None:
     """Its energy is 0, and none is negative."""

@@ -23,7 +23,7 @@ mod program;
 mod scaled;
 
 pub use interior_point::{
-    Correction, Outcome, Residuals, Settings, Solution, assess, correct, minimise,
+    Correction, Outcome, Residuals, Settings, Solution, assess, correct, minimise, minimise_near,
 };
 pub use layout::{Block, Layout};
 pub use linear::chain::{ByControls, Chain, Diagonal, NodeMatrix, NodeVector, Stage};

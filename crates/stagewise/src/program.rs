@@ -1,5 +1,6 @@
 //! The interface between a programme and the solver: values, derivatives, multipliers, points.
 
+use crate::interior_point::Residuals;
 use crate::layout::Layout;
 use crate::linear::chain::NodeVector;
 use crate::linearisation::Linearisation;
@@ -144,6 +145,13 @@ pub trait Program<const X: usize, const U: usize, const N: usize> {
     fn symmetries(&self, _point: &Self::Point) -> Vec<Vec<NodeVector<N>>> {
         Vec::new()
     }
+
+    /// Residuals with given multipliers as the tolerance counts them.
+    ///
+    /// By default as they are.
+    fn judged(&self, residuals: Residuals, _multipliers: &Multipliers) -> Residuals {
+        residuals
+    }
 }
 
 impl<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> Program<X, U, N> for &P {
@@ -194,6 +202,10 @@ impl<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> Progra
 
     fn symmetries(&self, point: &Self::Point) -> Vec<Vec<NodeVector<N>>> {
         (*self).symmetries(point)
+    }
+
+    fn judged(&self, residuals: Residuals, multipliers: &Multipliers) -> Residuals {
+        (*self).judged(residuals, multipliers)
     }
 }
 

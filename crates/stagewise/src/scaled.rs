@@ -1,5 +1,6 @@
 //! A programme in the units of what its objective is at a point.
 
+use crate::interior_point::Residuals;
 use crate::largest;
 use crate::layout::Layout;
 use crate::linear::PairMatrix;
@@ -11,7 +12,9 @@ use nalgebra::SMatrix;
 /// A programme whose objective is near to zero, in units in which its numbers are of order one: in the unit ε of the objective,
 /// and with equalities in √ε, as an objective that is a square falls with the square of what the equalities ask for.
 ///
-/// The residuals of the programme itself are small however far off its unknowns are, and its barrier is high.
+/// The residuals of the programme itself are small however far off its unknowns are, and its barrier is high. Where the
+/// unknowns change equalities by their squares alone, these are of the order of ε: so the residual of the equalities is in ε.
+/// Residuals are those beyond rounding.
 #[derive(Debug, Clone)]
 pub(crate) struct Scaled<P> {
     program: P,
@@ -22,14 +25,10 @@ pub(crate) struct Scaled<P> {
 }
 
 impl<P> Scaled<P> {
-    /// The programme in the units of its size at a point with multipliers; `None` where its own units do.
-    ///
-    /// Residuals are not asked to be smaller than rounding makes them: a tolerance of the objective's unit is no less than
-    /// rounding of the multipliers.
+    /// The programme in the units of its size at a point; `None` where its own units do.
     pub(crate) fn of<const X: usize, const U: usize, const N: usize>(
         program: P,
-        tolerance: f64,
-        at: &Stationary<P::Point>,
+        at: &P::Point,
     ) -> Option<Self>
     where
         P: Program<X, U, N>,
@@ -38,15 +37,10 @@ impl<P> Scaled<P> {
         const SMALL: f64 = 0.1;
         /// Size up to which an objective is nothing but rounding, in the programme's unit.
         const NOTHING: f64 = 1e-20;
-        /// Rounding of a gradient as a share of the largest multiplier, dimensionless.
-        const ROUNDING: f64 = 10.0 * f64::EPSILON;
-        let unit = program.scales().objective;
-        let multiplier = largest(at.multipliers.equalities.iter());
-        let own = program.size(&at.point) / unit;
-        let size = own.max(ROUNDING / tolerance * multiplier / unit);
+        let size = program.size(at) / program.scales().objective;
         // A power of four, the root of which is exact: scaling does not round.
         let exponent = (0.5 * size.log2()).round();
-        let is_small = own > NOTHING && size < SMALL;
+        let is_small = size > NOTHING && size < SMALL;
         is_small.then(|| Self {
             objective: (-2.0 * exponent).exp2(),
             equality: (-exponent).exp2(),
@@ -154,6 +148,32 @@ impl<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> Progra
 
     fn symmetries(&self, point: &Self::Point) -> Vec<Vec<NodeVector<N>>> {
         self.program.symmetries(point)
+    }
+
+    fn judged(&self, residuals: Residuals, multipliers: &Multipliers) -> Residuals {
+        /// Rounding of gradients as a share of the largest multiplier.
+        const ROUNDING: f64 = 10.0 * f64::EPSILON;
+        /// Rounding of equalities of the programme itself, over the square root of the count of stages along which states are
+        /// carried.
+        const OF_STAGES: f64 = 2.0 * f64::EPSILON;
+        let stages = self.layout().stages() as f64;
+        let multiplier = largest(multipliers.equalities.iter());
+        let beyond = |residual: f64, rounding: f64| match residual <= rounding {
+            true => 0.0,
+            false => residual - rounding,
+        };
+        let missed = beyond(
+            residuals.constraint,
+            OF_STAGES * stages.sqrt() * self.equality,
+        );
+        Residuals {
+            stationarity: beyond(
+                residuals.stationarity,
+                ROUNDING * multiplier * self.equality,
+            ),
+            constraint: missed * self.objective / self.equality,
+            ..residuals
+        }
     }
 }
 

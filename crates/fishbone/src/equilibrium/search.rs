@@ -156,6 +156,18 @@ impl Search {
         self.minimise(program, inside(program, point), barrier, proceed)
     }
 
+    /// Searches from a stationary point very near to a minimum, in the units of its energy.
+    pub(super) fn sharpened_from(
+        &self,
+        program: &BeltProgram,
+        near: &Stationary<BeltPoint>,
+        proceed: &mut Proceed,
+    ) -> Solution<BeltPoint> {
+        /// First barrier in the unit of the energy, no more than that of a converged minimum.
+        const BARRIER: f64 = 1e-9;
+        stagewise::minimise_near(program, &self.interior_point(BARRIER), near, proceed)
+    }
+
     /// Searches from the guess, or through the supports of a belt held between its ends, then from other starts, until a minimum
     /// is found; if none is, the best end.
     fn cold(&self, program: &BeltProgram, proceed: &mut Proceed) -> Solution<BeltPoint> {

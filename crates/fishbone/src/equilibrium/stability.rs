@@ -3,7 +3,6 @@
 use super::{Equilibrium, flat};
 use crate::problem::Problem;
 use crate::problem::program::{BeltPoint, BeltProgram, ROWS};
-use crate::strip::flat::FLAT;
 use nalgebra::Vector3;
 use stagewise::{Inertia, Outcome, Solution, Stationary, assess};
 
@@ -47,8 +46,7 @@ pub(super) fn with_square_ribs(
     solution: Solution<BeltPoint>,
 ) -> Solution<BeltPoint> {
     let mut at = solution.at.clone();
-    let is_flat = at.point.fields.iter().all(|fields| fields[0].abs() <= FLAT);
-    if !is_flat || solution.outcome != Outcome::Converged {
+    if !at.point.is_flat() || solution.outcome != Outcome::Converged {
         return solution;
     }
     for fields in &mut at.point.fields {
@@ -88,7 +86,7 @@ pub(super) fn decide(
     let is_open = inertia.cost_free > 0 && is_stressed && inertia.negative == 0;
     match is_open {
         true => flat::decide(program, problem.tolerance(), &solution.at),
-        // Negative modes of a belt at rest are those of rounding.
+        // Negative modes of a shape without energy are those of rounding: no motion lowers it.
         false if program.is_at_rest(&solution.at.point) => Some(Stability {
             negative_modes: 0,
             ..inertia.into()

@@ -378,13 +378,6 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         !self.is_weightless() || !self.loads.is_empty() || self.supports.iter().any(bears_moment)
     }
 
-    /// Whether nothing loads the belt and a shape has no energy: no motion lowers it, and it is a shape of any mesh.
-    pub(crate) fn is_at_rest(&self, shape: &BeltPoint<F>) -> bool {
-        /// Energy that is nothing but rounding, in mean R_f/U.
-        const NOTHING: f64 = 1e-20;
-        !self.is_loaded() && self.elastic_energy(&shape.fields) <= NOTHING
-    }
-
     fn is_weightless(&self) -> bool {
         self.weight == Vector3::zeros()
     }

@@ -34,7 +34,7 @@ pub fn correct<P: Program<X, U, N>, const X: usize, const U: usize, const N: usi
     tolerance: f64,
     near: Stationary<P::Point>,
 ) -> Option<Correction<P::Point>> {
-    let Some(scaled) = Scaled::of(program, tolerance, &near) else {
+    let Some(scaled) = Scaled::of(program, &near.point) else {
         return corrected(program, tolerance, near);
     };
     let own = corrected(&scaled, tolerance, scaled.own(&near))?;

@@ -124,48 +124,80 @@ pub fn minimise<P: Program<X, U, N>, const X: usize, const U: usize, const N: us
     if outcome != Outcome::Converged || settings.iterations <= found.iterations {
         return found;
     }
-    match Scaled::of(program, settings.tolerance, &found.at) {
+    match Scaled::of(program, &found.at.point) {
         None => found,
         Some(scaled) => {
             let settings = Settings {
-                barrier,
+                barrier: scaled.own_objective(barrier),
                 iterations: settings.iterations - found.iterations,
                 ..*settings
             };
-            sharpened(program, &scaled, settings, found, proceed)
+            let (sharp, is_nearer) = sharpened(program, &scaled, &settings, &found.at, proceed);
+            match sharp.outcome == Outcome::Converged || is_nearer {
+                true => Solution {
+                    outcome: Outcome::Converged,
+                    ..sharp.after(found.iterations)
+                },
+                false => found.after(sharp.iterations),
+            }
         }
     }
 }
 
-/// A minimum found again in the units of what the objective is there; as it was where this does not keep the tolerance.
+/// A minimum found from a stationary point nearby, with its multipliers, and from nowhere else: in the units of what the
+/// objective is there where it is small, as [`minimise`] ends.
+///
+/// `proceed` is called once an iteration, and interrupts by `Break`.
+pub fn minimise_near<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>(
+    program: &P,
+    settings: &Settings,
+    near: &Stationary<P::Point>,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Solution<P::Point> {
+    match Scaled::of(program, &near.point) {
+        None => {
+            let mut interior_point = InteriorPoint::new(program, *settings, near.point.clone());
+            interior_point.start_from(&near.multipliers);
+            let outcome = interior_point.iterate(proceed);
+            interior_point.finish(outcome)
+        }
+        Some(scaled) => sharpened(program, &scaled, settings, near, proceed).0,
+    }
+}
+
+/// The minimum near to a stationary point, found in the units of what the objective is there, in which `settings` are; and
+/// whether its residuals are smaller in these units than at the start, and within the tolerance in the programme's own.
 fn sharpened<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>(
     program: &P,
     scaled: &Scaled<&P>,
-    settings: Settings,
-    found: Solution<P::Point>,
+    settings: &Settings,
+    near: &Stationary<P::Point>,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
-) -> Solution<P::Point> {
-    let tolerance = settings.tolerance;
-    let settings = Settings {
-        barrier: scaled.own_objective(settings.barrier),
-        ..settings
-    };
-    let mut interior_point = InteriorPoint::new(scaled, settings, found.at.point.clone());
-    interior_point.start_from(&scaled.own(&found.at).multipliers);
-    interior_point.iterate(proceed);
-    let better = interior_point.finish(Outcome::Converged);
-    let at = Stationary {
-        multipliers: scaled.multipliers_of_original(&better.at.multipliers),
-        point: better.at.point,
-    };
-    let known = assess(program, tolerance, &at);
-    match known.outcome {
-        Outcome::Converged => Solution {
-            iterations: found.iterations + better.iterations,
-            ..known
-        },
-        _ => found.after(better.iterations),
+) -> (Solution<P::Point>, bool) {
+    let mut interior_point = InteriorPoint::new(scaled, *settings, near.point.clone());
+    interior_point.iterate.kkt.is_rigid = true;
+    interior_point.start_from(&scaled.own(near).multipliers);
+    let before = interior_point.iterate.residuals().largest();
+    if before > settings.tolerance {
+        interior_point.iterate.find_multipliers();
     }
+    let outcome = interior_point.iterate(proceed);
+    let found = interior_point.finish(outcome);
+    let at = Stationary {
+        multipliers: scaled.multipliers_of_original(&found.at.multipliers),
+        point: found.at.point,
+    };
+    let known = assess(program, settings.tolerance, &at);
+    let is_within = known.outcome == Outcome::Converged;
+    let sharp = Solution {
+        iterations: found.iterations,
+        outcome: match found.outcome {
+            Outcome::Converged if !is_within => Outcome::Stalled,
+            outcome => outcome,
+        },
+        ..known
+    };
+    (sharp, is_within && found.residuals.largest() < before)
 }
 
 /// Residuals and inertia of a given stationary point.
@@ -187,7 +219,7 @@ pub fn assess<P: Program<X, U, N>, const X: usize, const U: usize, const N: usiz
         false => Outcome::IterationLimit,
     };
     let assessed = interior_point.finish(outcome);
-    match Scaled::of(program, tolerance, &assessed.at) {
+    match Scaled::of(program, &assessed.at.point) {
         None => assessed,
         Some(scaled) => {
             let at = scaled.own(&assessed.at);

@@ -1,7 +1,7 @@
 //! A point with its multipliers under a barrier, and the Newton step from it.
 
-use super::Residuals;
 use super::barrier::{Barrier, Lengths};
+use super::{Residuals, UNBOUNDED};
 use crate::linear::chain::NodeVector;
 use crate::linear::{Inertia, Kkt};
 use crate::program::{Multipliers, Program, Scales, Values};
@@ -75,11 +75,12 @@ impl<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> Primal
     /// Residuals of the first-order conditions without a barrier.
     pub(crate) fn residuals(&mut self) -> Residuals {
         self.gradient.copy_from_slice(&self.kkt.linear.gradient);
-        Residuals {
+        let residuals = Residuals {
             stationarity: self.stationarity(),
             constraint: largest(self.values.equalities.iter()),
             complementarity: self.complementarity(0.0),
-        }
+        };
+        self.program.judged(residuals, &self.multipliers)
     }
 
     /// Stationarity residual with the equalities' multipliers at zero.
@@ -166,6 +167,38 @@ impl<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> Primal
         self.find_barrier_gradient();
         let targets = &self.values.equalities;
         self.kkt.find_rigid_step(&self.gradient, targets);
+    }
+
+    /// Puts the equalities' multipliers where Newton steps lead, at the same point, while this lowers the residual: rounding of
+    /// a long step of the multipliers is large beside a short step of the point.
+    pub(super) fn find_multipliers(&mut self) {
+        /// Greatest count of steps, a number.
+        const STEPS: usize = 10;
+        /// Ratio of successive residuals above which they end, dimensionless.
+        const FALLEN: f64 = 0.5;
+        let mut before = self.residuals().stationarity;
+        for _ in 0..STEPS {
+            self.assemble();
+            if self.kkt.factorise(UNBOUNDED).is_err() {
+                return;
+            }
+            self.find_rigid_step();
+            let known = self.multipliers.equalities.clone();
+            let steps = self.kkt.multiplier_step.iter();
+            for (multiplier, step) in self.multipliers.equalities.iter_mut().zip(steps) {
+                *multiplier += step;
+            }
+            self.linearise();
+            let now = self.residuals().stationarity;
+            if now > before {
+                self.multipliers.equalities = known;
+                self.linearise();
+            }
+            if now > FALLEN * before {
+                return;
+            }
+            before = now;
+        }
     }
 
     /// Gradient of the barrier problem's Lagrangian.

@@ -41,6 +41,8 @@ pub(crate) struct Kkt<const X: usize, const U: usize, const N: usize> {
     pub(crate) linear: Linearisation<X, U, N>,
     /// Stiffness of every inequality: multiplier over slack at the assembly; zero of an inequality that is left out.
     pub(crate) stiffness: Vec<f64>,
+    /// Whether equalities are always rows of a border: springs would be too soft to hold what they have to.
+    pub(crate) is_rigid: bool,
     diagonal: Diagonal<X, U, N>,
     factor: Factor<U, N>,
     /// Equalities between pairs, inequalities between pairs, then the squares in the second derivatives of both.
@@ -81,6 +83,7 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         Self {
             border: Border::new(pairs, layout.nodes()),
             exact: None,
+            is_rigid: false,
             stiffness: vec![0.0; layout.inequalities()],
             diagonal: linear.diagonal.clone(),
             factor: Factor::new(layout.stages()),
@@ -263,6 +266,16 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
     pub(crate) fn factorise_damped(&mut self, damping: f64) -> Result<(), TooConcave> {
         self.exact = None;
         self.factor_damping = damping;
+        if self.is_rigid {
+            let (chain, factor, most) = (&self.linear.chain, &mut self.factor, usize::MAX);
+            let concave =
+                chain.factorise(&self.diagonal, damping, &self.node_weights, most, factor)?;
+            let concave = concave + self.border.concave_rows();
+            return match self.hold_exactly()? >= concave {
+                true => Ok(()),
+                false => Err(TooConcave),
+            };
+        }
         let (chain, factor) = (&self.linear.chain, &mut self.factor);
         let most = self.border.rows.len();
         let concave = chain.factorise(&self.diagonal, damping, &self.node_weights, most, factor)?;
@@ -501,6 +514,28 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         let (equalities, others) = forces.as_slice().split_at(targets.len());
         self.multiplier_step.copy_from_slice(equalities);
         self.pair_forces.copy_from_slice(others);
+        for _ in 0..REFINEMENTS {
+            let most = self.take_missing_at_nodes(targets_at);
+            if most <= EXACT {
+                return most;
+            }
+            self.pull_again_at_nodes(targets_at);
+            self.linear
+                .chain
+                .solve(&mut self.factor, &self.pulls, &mut self.correction);
+            let forces = [vec![0.0; targets.len()], self.pair_forces.clone()].concat();
+            let rows = border.rows.iter().zip(border.changes(&self.step));
+            let rows = rows.zip(all.iter().zip(&forces));
+            let missing: Vec<f64> = rows
+                .map(|((row, change), (target, force))| change + target - row.compliance * force)
+                .collect();
+            let forces = border.correct(&missing, &mut self.correction);
+            let steps = self.multiplier_step.iter_mut().chain(&mut self.pair_forces);
+            steps.zip(&forces).for_each(|(step, force)| *step += force);
+            for (step, correction) in self.step.iter_mut().zip(&self.correction) {
+                *step += correction;
+            }
+        }
         self.take_missing_at_nodes(targets_at)
     }
 

@@ -9,9 +9,9 @@ use stagewise::Pace;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-/// Whether a belt lies without load and energy.
-fn is_at_rest(solved: &Solved) -> bool {
-    solved.program.is_at_rest(&solved.at.point)
+/// Whether a belt is flat and at rest.
+fn is_flat_at_rest(Solved { program, at, .. }: &Solved) -> bool {
+    at.point.is_flat() && program.is_at_rest(&at.point)
 }
 
 /// The start of the branch that leaves a flat board at rest: a minimum a little on along the path, with the path on its mesh;
@@ -25,7 +25,7 @@ pub(super) fn off_flat(
 ) -> Option<(Along, Station)> {
     /// Places to start from, in the longest step, tried in turn.
     const PLACES: [f64; 3] = [0.2, 1.0, 0.05];
-    if !is_at_rest(solved) {
+    if !is_flat_at_rest(solved) {
         return None;
     }
     PLACES.into_iter().find_map(|share| {
@@ -33,7 +33,7 @@ pub(super) fn off_flat(
         let problem = path.at(place)?;
         let found = from_guess(&problem, &mut || proceed(0, place));
         let solved = found.certified().ok()?;
-        if is_at_rest(solved) || found.stable() == Some(false) {
+        if is_flat_at_rest(solved) || found.stable() == Some(false) {
             return None;
         }
         let family = Along {
@@ -77,7 +77,10 @@ pub(super) fn end_flat(
         return None;
     }
     let flat = from_guess(&path.at(end)?, &mut || proceed(0, end));
-    let solved = flat.certified().ok().filter(|solved| is_at_rest(solved))?;
+    let solved = flat
+        .certified()
+        .ok()
+        .filter(|solved| is_flat_at_rest(solved))?;
     let here = diagram.equilibrium(0, branch.states.len() - 1);
     if here.displacement(&flat) > NEAR {
         return None;

@@ -4,7 +4,6 @@ use super::{BeltPoint, BeltProgram, DeadForce, Piece, ROWS, add_wrench, rows_of,
 use crate::geometry::{Pose, Twist, hat};
 use crate::strip::density::{Density, Derivatives, LANES, Loaded};
 use crate::strip::element::Element;
-use crate::strip::flat::FLAT;
 use nalgebra::{Matrix3, Matrix3x6, Matrix6, Vector6};
 use stagewise::{Layout, Linearisation, Multipliers, NodeVector, Program, StageMatrix, Values};
 
@@ -36,9 +35,9 @@ impl<D: Density<F>, const F: usize, const N: usize> Program<6, F, N> for BeltPro
         })
     }
 
-    /// The elastic energy: for given supports the square of how far a belt bends. Zero of a flat belt.
+    /// The elastic energy: for given supports the square of how far a belt bends. Zero of a flat belt without a natural bend.
     fn size(&self, point: &Self::Point) -> f64 {
-        match point.fields.iter().all(|fields| fields[0].abs() <= FLAT) {
+        match point.is_flat() && !self.is_curled() {
             true => 0.0,
             false => self.elastic_energy(&point.fields).min(1.0),
         }

@@ -8,7 +8,7 @@
 use super::{BeltPoint, BeltProgram, ROWS};
 use crate::geometry::Pose;
 use crate::strip::density::Density;
-use nalgebra::{DMatrix, SymmetricEigen, Vector3, Vector6};
+use nalgebra::{DMatrix, SVD, Vector3, Vector6};
 
 /// Force and moment about a point, world axes.
 type Wrench = (Vector3<f64>, Vector3<f64>);
@@ -72,7 +72,7 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         const INDEPENDENT: f64 = 1e-4;
         /// Eigenvalue below which conditions depend on each other; dimensionless. A belt between two clamps with a slack of
         /// s lengths has some 0.1 s.
-        const DEPENDENT: f64 = 1e-11;
+        const DEPENDENT: f64 = 1e-15;
         // A link between two of these elements would not be moved by any of them.
         let every = self.pieces.len() / FEW;
         if every > 1
@@ -98,12 +98,11 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         let scaled = DMatrix::from_fn(used.len(), work.ncols(), |i, j| {
             work[(used[i], j)] / squares[used[i]].sqrt()
         });
-        let eigen = SymmetricEigen::new(&scaled * scaled.transpose());
-        let combinations = eigen
-            .eigenvalues
-            .iter()
-            .zip(eigen.eigenvectors.column_iter());
-        let free = combinations.filter(|(value, _)| **value < most);
+        // The squares of singular values are the eigenvalues, without the rounding of products.
+        let singular = SVD::new(scaled, true, false);
+        let vectors = singular.u.expect("asked for");
+        let combinations = singular.singular_values.iter().zip(vectors.column_iter());
+        let free = combinations.filter(|(value, _)| *value * *value < most);
         free.map(|(_, vector)| {
             let mut multipliers = vec![0.0; squares.len()];
             for (row, part) in used.iter().zip(&vector) {

@@ -1,12 +1,34 @@
-//! The programme of a belt that may twist where it is flat, by whatever slope of ribs.
+//! Flat belts and belts at rest, and the programme of a belt that may twist where it is flat, by whatever slope of ribs.
 
 use super::{BeltPoint, BeltProgram, Piece};
+use crate::strip::density::Density;
 use crate::strip::flat::{FLAT, FreeTorsion};
 use nalgebra::SVector;
 use stagewise::{Program, Stationary};
 
 /// The programme of a belt with its torsion as a third field.
 pub(crate) type TwistingProgram = BeltProgram<FreeTorsion, 3, 9>;
+
+impl<const F: usize> BeltPoint<F> {
+    /// Whether the belt is flat all along.
+    pub(crate) fn is_flat(&self) -> bool {
+        self.fields.iter().all(|fields| fields[0].abs() <= FLAT)
+    }
+}
+
+impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
+    /// Whether a part of the belt has a natural bend.
+    pub(crate) fn is_curled(&self) -> bool {
+        self.elements().any(|(_, element)| element.curl.bend != 0.0)
+    }
+
+    /// Whether a shape has no energy and the belt no load.
+    pub(crate) fn is_at_rest(&self, shape: &BeltPoint<F>) -> bool {
+        /// Energy that is nothing but rounding, in mean R_f/U.
+        const NOTHING: f64 = 1e-20;
+        !self.is_loaded() && self.elastic_energy(&shape.fields) <= NOTHING
+    }
+}
 
 impl BeltProgram {
     /// The nodes inside flat parts: flat, with flat elements alone beside them.
