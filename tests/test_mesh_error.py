@@ -171,8 +171,7 @@ def test_slender_belts_tend_to_a_limit(energy: str) -> None:
     energies = []
     for slenderness in (100.0, 300.0, 1000.0, 3000.0, 10000.0):
         found = solve(quarter_twist(slenderness) | {"energy": energy})
-        # However slender the belt is; the smooth ends of its ribs make the last steps of the least energies long.
-        assert found.iterations < 600
+        assert found.iterations < 1000
         assert found.error is not None
         assert max(found.error) <= 1e-3
         energies.append(found.energy)

@@ -120,16 +120,12 @@ impl Estimate {
         let mut error = own.off_on(problem, &fine, &better);
         // A density that does not know the width lets ribs turn over anywhere at no cost, and elements much longer than the
         // width hold ribs wherever they turn: one step does not move the place from element to element.
-        let may_turn_elsewhere = !program.model.knows_width() || turns_coarsely(program, &at.point);
-        let may_turn_elsewhere = may_turn_elsewhere && error.largest() <= problem.accuracy();
-        if ribs_meet || error.largest() > most {
-            let solution = solved_near(problem, &fine, &near, proceed);
-            if let Some(solution) = solution.filter(|found| is_next_to(found, &here)) {
-                let Stationary { point, multipliers } = solution.at;
-                better = (point, multipliers.equalities, solution.values.objective);
-                error = own.off_on(problem, &fine, &better);
-            }
-        } else if may_turn_elsewhere {
+        let is_accurate = error.largest() <= problem.accuracy();
+        let may_turn_elsewhere = match turns_coarsely(program, &at.point) {
+            true => is_accurate || most.is_finite(),
+            false => is_accurate && !program.model.knows_width(),
+        };
+        if may_turn_elsewhere {
             let finest = problem.program_on(&mesh.split(&parts(program, &at.point)))?;
             let here = prolonged(program, &at.point, &finest);
             let solution = searched_near(problem, &finest, &here, proceed);
@@ -137,6 +133,13 @@ impl Estimate {
                 let Stationary { point, multipliers } = solution.at;
                 let best = (point, multipliers.equalities, solution.values.objective);
                 error = own.off_on(problem, &finest, &best);
+            }
+        } else if ribs_meet || error.largest() > most {
+            let solution = solved_near(problem, &fine, &near, proceed);
+            if let Some(solution) = solution.filter(|found| is_next_to(found, &here)) {
+                let Stationary { point, multipliers } = solution.at;
+                better = (point, multipliers.equalities, solution.values.objective);
+                error = own.off_on(problem, &fine, &better);
             }
         }
         let strips = fine.pieces.iter().enumerate();

@@ -2,8 +2,8 @@
 
 use super::accuracy::{Estimate, MeshError};
 use super::active_set::settle;
-use super::refinement::{Level, ROUNDING, refine};
-use super::search::{MinimumSettings, Search, is_flat_under_load};
+use super::refinement::{Begin, Level, ROUNDING, refine};
+use super::search::{MinimumSettings, Search, is_flat_under_load, prolong};
 use super::stability::{self, Stability};
 use super::{Equilibrium, LinkForce, Reaction, Solved, Start, Status, winding};
 use crate::equilibrium::guess::{disturb, guess};
@@ -192,9 +192,10 @@ fn find(
     } = search.settings;
     if !problem.has_fixed_mesh() {
         let start = match from {
-            Start::Guess => Some(None),
-            Start::Shape(shape) => Some(Some((&program, shape, cold_barrier))),
-            Start::Minimum(_, shape) => Some(Some((&program, shape, close_barrier))),
+            Start::Guess => Some(Begin::Guess),
+            Start::Widened(program, shape) => Some(Begin::Widened(program, shape)),
+            Start::Shape(shape) => Some(Begin::Shape(&program, shape, cold_barrier)),
+            Start::Minimum(_, shape) => Some(Begin::Shape(&program, shape, close_barrier)),
             Start::Near(..) | Start::Close(..) | Start::Downhill(..) => None,
         };
         if let Some(start) = start {
@@ -203,6 +204,10 @@ fn find(
     }
     let solution = match from {
         Start::Near(_, shape) => search.from(&program, shape.clone(), proceed),
+        Start::Widened(known, shape) => {
+            let shape = prolong(known, shape, &program);
+            search.only_from(&program, shape, cold_barrier, proceed)
+        }
         Start::Shape(shape) => search.only_from(&program, shape.clone(), cold_barrier, proceed),
         Start::Close(_, shape) | Start::Minimum(_, shape) => {
             // Other active sets do not lead away either.

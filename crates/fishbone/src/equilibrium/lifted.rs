@@ -82,6 +82,7 @@ pub(super) fn brought_back(
             return Some(Equilibrium {
                 iterations,
                 error,
+                warnings: with_warnings(&far, &near),
                 ..near
             });
         }
@@ -98,8 +99,19 @@ pub(super) fn brought_back(
         iterations,
         error,
         stability,
+        warnings: with_warnings(&far, &near),
         ..near
     })
+}
+
+/// The warnings of a solve, and those of the larger lift that it does not have itself, as that of the side.
+fn with_warnings(far: &Equilibrium, near: &Equilibrium) -> Vec<String> {
+    let own = near.warnings.iter();
+    let further = far
+        .warnings
+        .iter()
+        .filter(|warning| !near.warnings.contains(warning));
+    own.chain(further).cloned().collect()
 }
 
 /// A board that is held nearly in its flat shape.

@@ -335,6 +335,8 @@ enum Start<'a> {
     Near(&'a Mesh, &'a BeltPoint),
     /// On meshes that follow the error, the first of which is given, at a minimum, and nowhere else.
     Minimum(&'a Mesh, &'a BeltPoint),
+    /// At a shape of another programme, widened where the mesh follows the error of a slender belt, and nowhere else.
+    Widened(&'a BeltProgram, &'a BeltPoint),
     /// At a shape that need not be near to a minimum, and nowhere else.
     Shape(&'a BeltPoint),
     /// On a mesh, at a shape very near to a minimum, and nowhere else.

@@ -11,7 +11,7 @@ use crate::scenario::SAME_PLACE;
 use crate::strip::element::Element;
 use slender::narrowed;
 pub(super) use slender::{
-    PER_WIDTH, is_slender, mesh_about_ribs, mesh_for_ribs_anywhere, ribs_turn,
+    PER_WIDTH, is_slender, mesh_about_ribs, mesh_for_ribs_anywhere, ribs_turn, widened,
 };
 use stagewise::{Distance, Outcome, Solution};
 use std::ops::ControlFlow;
@@ -49,17 +49,34 @@ pub(super) struct Level {
     pub(super) estimate: Option<Estimate>,
 }
 
-/// Finds a minimum on meshes graded to the estimated error, until the error is as small as the problem asks: from a shape of
-/// a programme, on its mesh first, with a first barrier; without one from the guess. If no mesh carries the accuracy, the best result of all.
+/// The start of a search on meshes that follow the error.
+pub(super) enum Begin<'a> {
+    /// At the guess.
+    Guess,
+    /// At a shape of a programme, of the widened belt if the belt is slender.
+    Widened(&'a BeltProgram, &'a BeltPoint),
+    /// At a shape of a programme, on its mesh, with a first barrier.
+    Shape(&'a BeltProgram, &'a BeltPoint, f64),
+}
+
+/// Finds a minimum on meshes graded to the estimated error, until the error is as small as the problem asks. If no mesh carries
+/// the accuracy, the best result of all.
 pub(super) fn refine(
     problem: &Problem,
     search: &Search,
-    start: Option<(&BeltProgram, &BeltPoint, f64)>,
+    from: Begin,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Level {
-    let (mut best, mut mesh) = match start {
-        Some((program, ..)) => (None, Mesh::of(problem, program)),
-        None => first_level(problem, search, proceed),
+    let (mut best, mut mesh) = match from {
+        Begin::Guess => first_level(problem, search, None, proceed),
+        Begin::Widened(program, shape) => {
+            first_level(problem, search, Some((program, shape)), proceed)
+        }
+        Begin::Shape(program, ..) => (None, Mesh::of(problem, program)),
+    };
+    let start = match from {
+        Begin::Shape(program, shape, barrier) => Some((program, shape, barrier)),
+        Begin::Guess | Begin::Widened(..) => None,
     };
     let above_rounding = Search {
         tolerance: search.tolerance.max(ROUNDING),
@@ -132,18 +149,22 @@ fn rough(search: &Search) -> Search {
     }
 }
 
-/// The minimum of an easier problem and the mesh for the problem itself; without an easier one, its first mesh alone.
+/// The minimum of an easier problem, near to a shape if one is given, and the mesh for the problem itself; without an easier one,
+/// its first mesh alone.
 fn first_level(
     problem: &Problem,
     search: &Search,
+    near: Option<(&BeltProgram, &BeltPoint)>,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> (Option<Level>, Mesh) {
     let rough = rough(search);
     let mesh = first_mesh(problem);
-    if let Some(level) = loaded(problem, &rough, &mesh, proceed) {
+    if near.is_none()
+        && let Some(level) = loaded(problem, &rough, &mesh, proceed)
+    {
         return (Some(level), mesh);
     }
-    match narrowed(problem, &rough, &mesh, proceed) {
+    match narrowed(problem, &rough, &mesh, near, proceed) {
         Some(level) => {
             let mesh = Mesh::of(problem, &level.program);
             (Some(level), mesh)

@@ -1,10 +1,9 @@
 //! The side to which a belt bulges, and the search on the other side, which begins at its mirror images.
 
 use super::intrinsic::solve;
+use super::refinement::widened;
 use super::search::{Search, fields_at, prolong};
-use super::{
-    Equilibrium, Solved, Start, is_slender_on_graded_mesh, minimum_from, slender_minimum_near,
-};
+use super::{Equilibrium, Solved, Start, is_slender_on_graded_mesh, minimum_from};
 use crate::geometry::Pose;
 use crate::problem::program::{BeltPoint, BeltProgram, NodeSupport, Piece};
 use crate::problem::{Mesh, Problem};
@@ -184,13 +183,27 @@ fn pushed_over(
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Equilibrium {
     let search = Search::of(problem);
-    let mut program = solved.program.clone();
-    let [_, across] = along_and_across(&program, &solved.at.point, &problem.bulge());
+    let is_widened = is_slender_on_graded_mesh(problem);
+    let (known, point) = (&solved.program, &solved.at.point);
+    let mut program = if is_widened {
+        widened(problem)
+    } else {
+        known.clone()
+    };
+    let point = if is_widened {
+        prolong(known, point, &program)
+    } else {
+        point.clone()
+    };
+    let [_, across] = along_and_across(&program, &point, &problem.bulge());
     program.weight += push * across;
-    let point = solved.at.point.clone();
     let pushed = search.only_from(&program, point, search.settings.warm_barrier, proceed);
     let mesh = Mesh::of(problem, &program);
-    solve(problem, Start::Minimum(&mesh, &pushed.at.point), proceed)
+    let start = match is_widened {
+        true => Start::Widened(&program, &pushed.at.point),
+        false => Start::Minimum(&mesh, &pushed.at.point),
+    };
+    solve(problem, start, proceed)
 }
 
 /// A mirror that takes a belt to a belt: the frames, as columns, from R to Q R S. Q is the mirror of space, S the mirror of
@@ -438,11 +451,9 @@ impl Image {
         solved: &Solved,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Equilibrium {
-        if is_slender_on_graded_mesh(problem)
-            && let Some(found) =
-                slender_minimum_near(problem, &solved.program, &self.shape, proceed)
-        {
-            return found;
+        if is_slender_on_graded_mesh(problem) {
+            let start = Start::Widened(&solved.program, &self.shape);
+            return solve(problem, start, proceed);
         }
         let program = problem.program(problem.elements());
         let shape = prolong(&solved.program, &self.shape, &program);

@@ -31,7 +31,8 @@ struct Widened {
 }
 
 /// The minimum of a wider belt made narrower step by step, down to the belt itself; `None` of a belt that is not slender or may
-/// slide along itself, which has no place on a graded mesh, and where this leads nowhere.
+/// slide along itself, which has no place on a graded mesh, and where this leads nowhere. The search for the wider belt begins
+/// at a shape of another programme, or at the guess.
 ///
 /// The ribs of a slender belt turn within a length of its width. Those of a wider belt turn at nearly the same places, and
 /// less suddenly. The places move in proportion to the width, and what is within a width of them keeps its shape in units of
@@ -40,6 +41,7 @@ pub(super) fn narrowed(
     problem: &Problem,
     search: &Search,
     mesh: &Mesh,
+    near: Option<(&BeltProgram, &BeltPoint)>,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Option<Level> {
     /// Factor by which the belt is made narrower at first and at most, dimensionless.
@@ -55,7 +57,7 @@ pub(super) fn narrowed(
         return None;
     }
     let program = problem.program_on(mesh)?.widened(width);
-    let level = Level::on(problem, search, program, None, barrier, proceed);
+    let level = Level::on(problem, search, program, near, barrier, proceed);
     let mut iterations = level.solution.iterations;
     let mut best = Widened::at(width, level, &breaks)?;
     let mut settled: Vec<Widened> = Vec::new();
@@ -246,6 +248,11 @@ fn first_width(problem: &Problem) -> f64 {
     let radii = program.elements().map(|(_, e)| e.geodesic.abs().recip());
     let least = radii.fold(shortest, f64::min);
     (WIDE.min(SHARE * least) / own_width(problem)).max(1.0)
+}
+
+/// The programme of the widened belt that is solved first for a slender one.
+pub(in crate::equilibrium) fn widened(problem: &Problem) -> BeltProgram {
+    problem.program(FIRST).widened(first_width(problem))
 }
 
 /// Whether a belt is so slender that its ribs turn within a small part of its length.
