@@ -89,7 +89,7 @@ def test_the_angle_is_that_of_the_lid(opening):
 def test_a_picture_along_an_angle_shows_radius_and_limit(opening):
     figure = plot.diagram(opening, radius_limit=0.01)
     assert figure.axes[-1].get_xlabel() == "angle of supports[1] [degrees]"
-    [axes] = [axes for axes in figure.axes if axes.get_ylabel() == "least radius\n[length]"]
+    [axes] = [axes for axes in figure.axes if axes.get_ylabel() == "least radius\n[m]"]
     assert any(np.all(np.asarray(line.get_ydata()) == 0.01) for line in axes.lines)
 
 
