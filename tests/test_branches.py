@@ -166,7 +166,7 @@ def test_out_of_reach_is_one_infeasible_result(out_of_reach):
 
 
 def test_the_search_is_the_whole_one_unless_a_budget_is_given():
-    """By the number of its tasks: more than 1100 starts, as the documents say, fewer with a budget."""
+    """By the number of its tasks: at least 135 + 160 starts, as the documents say, fewer with a budget."""
     flat = fb.Scenario.from_dict({"belt": FREE, "solver": {"elements": 4}})
     planned = {}
 
@@ -176,8 +176,7 @@ def test_the_search_is_the_whole_one_unless_a_budget_is_given():
     [whole] = fb.branches(flat, progress=progress("whole"))
     [part] = _search(flat, FEW, progress("few"))
     assert whole.energy == pytest.approx(part.energy, abs=1e-12)
-    assert planned["whole"] > 1100
-    assert 0 < planned["few"] < 400
+    assert planned["whole"] >= 135 + 160 > planned["few"] > 0
 
 
 def test_progress_never_passes_what_is_planned(arch):

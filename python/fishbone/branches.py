@@ -27,13 +27,13 @@ class _Budget(NamedTuple):
 def branches(scenario: Scenario, *, progress: Callable[[int, int], object] | None = None) -> list[Equilibrium]:
     """The equilibria found of a scenario, rising in energy: minima, and saddles with one or two negative modes.
 
-    Some 1100 to 4100 searches, from waves of bend and rib slope over the length of the belt, find minima. Perturbations
-    of these minima along their lowest modes lead to more minima. Continuation in modal loads leads from the 4 lowest
-    equilibria to saddles, and the solver goes downhill from each saddle to either side. Equilibria that are unconfirmed
-    on refinement, by a mesh twice as fine, are left out; of equilibria that the mesh does not resolve the lowest is
-    kept. Of two mirror images the list has the one on the side of the scenario's `bulge`. A belt may pass through
-    itself during the search: check `Equilibrium.crosses_itself`. The same scenario has the same list. Where no
-    equilibrium is found the list has the failed result of `solve`, with its message.
+    Some 300 to 4000 searches on two meshes, from waves of bend and rib slope over the length of the belt, find minima.
+    Continuation in modal loads leads from the 4 lowest equilibria to saddles, and the solver goes downhill from each
+    saddle to either side. Perturbations of the minima along their lowest modes lead to more minima. Equilibria that
+    are unconfirmed on refinement, by a mesh twice as fine, are left out; of equilibria that the mesh does not resolve
+    the lowest is kept. Of two mirror images the list has the one on the side of the scenario's `bulge`. A belt may
+    pass through itself during the search: check `Equilibrium.crosses_itself`. The same scenario has the same list.
+    Where no equilibrium is found the list has the failed result of `solve`, with its message.
 
     `progress(done, planned)` is called from the calling thread during the search; both are numbers of tasks. All cores
     are used, other threads run meanwhile, and Ctrl-C ends the search.

@@ -24,6 +24,7 @@ mod scaled;
 
 pub use interior_point::{
     Correction, Outcome, Residuals, Settings, Solution, assess, correct, minimise, minimise_near,
+    minimise_past,
 };
 pub use layout::{Block, Layout};
 pub use linear::chain::{ByControls, Chain, Diagonal, NodeMatrix, NodeVector, Stage};

@@ -8,10 +8,13 @@
 
 mod settings;
 mod starts;
+mod trails;
 
 pub use settings::{SearchSettings, Wave};
 
-use crate::equilibrium::{Equilibrium, Status, minimum_from, minimum_next_to, of_solution};
+use crate::equilibrium::{
+    Equilibrium, Status, minimum_from, minimum_next_to, near_minimum_from, of_solution,
+};
 use crate::problem::Problem;
 use crate::problem::program::{BeltPoint, BeltProgram};
 use crate::scenario::Method;
@@ -20,6 +23,7 @@ use stagewise::Stationary;
 use std::ops::ControlFlow;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use trails::{Passed, Trails};
 
 /// A mode of the programme.
 type Mode = stagewise::Mode<8>;
@@ -60,20 +64,27 @@ pub fn branches(
     }
     let on_mesh = |elements| problem.with_elements(elements).ok();
     let fine = on_mesh(problem.elements()).unwrap_or_else(|| problem.clone());
-    let rough = on_mesh(settings.elements.min(problem.elements())).unwrap_or_else(|| fine.clone());
+    let [rough, middle] = [settings.coarse_elements, settings.elements]
+        .map(|most| on_mesh(most.min(problem.elements())).unwrap_or_else(|| fine.clone()));
     let mut census = Census {
         problem: &rough,
         settings,
         run,
         watch,
         found: Vec::new(),
+        trails: Trails::default(),
         done: AtomicUsize::new(0),
         planned: 0,
     };
     census.enter(crate::solve::solve(&rough, proceed));
     census.start();
-    census.perturb();
+    census.start_from_sums();
     census.load();
+    if census.promote(&middle) {
+        // Some equilibria are there on this mesh only.
+        census.start_from_sums();
+    }
+    census.perturb();
     census.promote(&fine);
     census.confirm();
     census.face();
@@ -93,11 +104,13 @@ struct Census<'a> {
     run: &'a Run<'a>,
     watch: &'a dyn Watch,
     found: Vec<Equilibrium>,
+    /// What the searches on the mesh of `problem` have passed.
+    trails: Trails,
     done: AtomicUsize,
     planned: usize,
 }
 
-impl Census<'_> {
+impl<'a> Census<'a> {
     /// Runs a task for each item; returns the results in the order of the items.
     fn each<T: Sync, R: Send + Sync>(
         &mut self,
@@ -105,12 +118,22 @@ impl Census<'_> {
         task: impl Fn(&T) -> R + Sync,
     ) -> Vec<R> {
         self.planned += items.len();
+        self.each_planned(items, task)
+    }
+
+    /// As [`Self::each`], for items that are planned already.
+    fn each_planned<T: Sync, R: Send + Sync>(
+        &self,
+        items: &[T],
+        task: impl Fn(&T) -> R + Sync,
+    ) -> Vec<R> {
+        let (done, planned, watch) = (&self.done, self.planned, self.watch);
         let slots: Vec<OnceLock<R>> = items.iter().map(|_| OnceLock::new()).collect();
         (self.run)(items.len(), &|i| {
             let filled = slots[i].set(task(&items[i]));
             debug_assert!(filled.is_ok(), "every task runs once");
-            let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
-            self.watch.report(done, self.planned);
+            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+            watch.report(done, planned);
         });
         slots.into_iter().filter_map(OnceLock::into_inner).collect()
     }
@@ -159,17 +182,24 @@ impl Census<'_> {
         known[before..].to_vec()
     }
 
-    /// Minimises from many starts, and from more as long as they lead to anything new.
+    /// Minimises from arches with waves over them.
     fn start(&mut self) {
+        self.minimise(&starts::arches(self.problem, self.settings));
+    }
+
+    /// Minimises from sums of waves, and from more as long as they lead to anything unlike what is known.
+    fn start_from_sums(&mut self) {
         let (problem, settings) = (self.problem, self.settings);
-        self.minimise(&starts::arches(problem, settings));
         let mut tried = 0;
         let mut is_fruitful = true;
         while is_fruitful && tried < settings.sums {
             let next = settings.sums.min(tried + settings.batch);
             let known = self.found.len();
             self.minimise(&starts::sums(problem, tried..next));
-            is_fruitful = self.found.len() > known;
+            let (known, new) = self.found.split_at(known);
+            let is_like =
+                |new: &Equilibrium| known.iter().any(|known| settings.is_like(known, new));
+            is_fruitful = !new.iter().all(is_like);
             tried = next;
         }
     }
@@ -177,35 +207,36 @@ impl Census<'_> {
     /// Minimises from each of some starts.
     fn minimise(&mut self, starts: &[BeltPoint]) {
         let (problem, settings, watch) = (self.problem, self.settings, self.watch);
-        let found = self.each(starts, |start| {
-            minimum_from(problem, start, &mut settings.budget(watch))
-        });
-        for equilibrium in found {
-            self.enter(equilibrium);
+        self.planned += starts.len();
+        for some in starts.chunks(settings.searches_at_a_time) {
+            let trails = std::mem::take(&mut self.trails);
+            let found = self.each_planned(some, |start| {
+                new_minimum_from(problem, settings, start, &trails, watch)
+            });
+            self.trails = trails;
+            for (way, equilibrium) in found {
+                self.trails.extend(way);
+                if let Some(equilibrium) = equilibrium {
+                    self.enter(equilibrium);
+                }
+            }
         }
     }
 
     /// Perturbs the minima along their lowest modes, the lowest in energy first, and the minima found in this way in turn;
     /// of minima that are alike only one.
     fn perturb(&mut self) {
-        let mut perturbed = Vec::new();
+        let mut known = Vec::new();
         loop {
             let is_minimum = |e: &Equilibrium| e.stable() == Some(true);
-            let most = self.settings.perturbed - perturbed.len();
-            let next = self.lowest_unlike(&mut perturbed, most, is_minimum);
+            let most = self.settings.perturbed - known.len();
+            let next = self.lowest_unlike(&mut known, most, is_minimum);
             if next.is_empty() {
                 return;
             }
-            let (problem, settings, watch) = (self.problem, self.settings, self.watch);
-            let found = self.each(&next, |minimum| {
-                let modes = lowest_modes(minimum, settings.perturbed_modes);
-                let perturb =
-                    |mode: &Mode| perturbed_along(problem, settings, minimum, mode, watch);
-                modes.iter().flat_map(perturb).collect::<Vec<_>>()
-            });
-            for equilibrium in found.into_iter().flatten() {
-                self.enter(equilibrium);
-            }
+            let settings = self.settings;
+            let starts = self.each(&next, |minimum| perturbed(settings, minimum));
+            self.minimise(&starts.concat());
         }
     }
 
@@ -242,17 +273,24 @@ impl Census<'_> {
         }
     }
 
-    /// Replaces the equilibria by those to which they lead on the mesh of another problem.
-    fn promote(&mut self, problem: &Problem) {
+    /// Goes on to the mesh of another problem, and replaces the equilibria by those to which they lead there; false where that
+    /// is the same mesh.
+    fn promote(&mut self, problem: &'a Problem) -> bool {
+        if problem.elements() == self.problem.elements() {
+            return false;
+        }
+        self.problem = problem;
+        self.trails = Trails::default();
         let mut found = std::mem::take(&mut self.found);
         found.sort_by(|a, b| a.energy.total_cmp(&b.energy));
-        let watch = self.watch;
+        let (settings, watch) = (self.settings, self.watch);
         let led_to = self.each(&found, |found| {
-            found.led_to(problem, &mut || watch.proceed())
+            found.led_to(problem, &mut settings.budget(watch))
         });
         for equilibrium in led_to.into_iter().flatten() {
             self.enter(equilibrium);
         }
+        true
     }
 
     /// Keeps the equilibria that are confirmed on a mesh twice as fine; of equilibria that this mesh does not separate the
@@ -262,7 +300,7 @@ impl Census<'_> {
         found.sort_by(|a, b| a.energy.total_cmp(&b.energy));
         let (settings, watch) = (self.settings, self.watch);
         let fine = self.each(&found, |found| {
-            on_finer_mesh(settings, found, &mut || watch.proceed())
+            on_finer_mesh(settings, found, &mut settings.budget(watch))
         });
         let mut known: Vec<(Equilibrium, f64)> = Vec::new();
         for (found, fine) in found.into_iter().zip(fine) {
@@ -366,21 +404,43 @@ fn lowest_modes(equilibrium: &Equilibrium, count: usize) -> Vec<Mode> {
     modes
 }
 
-/// The minima found from a minimum displaced far along a mode.
-fn perturbed_along(
+/// What a search for a minimum has passed, and the minimum; none where the search came to the way of an earlier one.
+fn new_minimum_from(
     problem: &Problem,
     settings: &SearchSettings,
-    from: &Equilibrium,
-    mode: &Mode,
+    start: &BeltPoint,
+    trails: &Trails,
     watch: &dyn Watch,
-) -> Vec<Equilibrium> {
-    let Some(solved) = &from.solved else {
+) -> (Vec<Passed>, Option<Equilibrium>) {
+    let mut way = Vec::new();
+    let pass = &mut |barrier: f64, shape: &BeltPoint| {
+        if barrier > settings.highest_barrier {
+            return ControlFlow::Continue(());
+        }
+        if trails.lead_past(barrier, shape) {
+            return ControlFlow::Break(());
+        }
+        let shape = shape.clone();
+        way.push(Passed { barrier, shape });
+        ControlFlow::Continue(())
+    };
+    let proceed = &mut settings.budget(watch);
+    let near = near_minimum_from(problem, start, pass, proceed);
+    let minimum = near.map(|near| minimum_next_to(problem, &near, proceed));
+    (way, minimum)
+}
+
+/// Shapes of a minimum displaced far along its lowest modes.
+fn perturbed(settings: &SearchSettings, minimum: &Equilibrium) -> Vec<BeltPoint> {
+    let Some(solved) = &minimum.solved else {
         return Vec::new();
     };
-    let far = settings.perturbations.iter();
-    far.map(|far| stagewise::moved(&solved.program, &solved.at.point, mode, *far))
-        .map(|start| minimum_from(problem, &start, &mut settings.budget(watch)))
-        .collect()
+    let modes = lowest_modes(minimum, settings.perturbed_modes);
+    let displaced = modes.iter().flat_map(|mode| {
+        let far = settings.perturbations.iter();
+        far.map(move |far| stagewise::moved(&solved.program, &solved.at.point, mode, *far))
+    });
+    displaced.collect()
 }
 
 /// The equilibrium to which a modal load leads and, if it is a saddle, the minima downhill on either side.

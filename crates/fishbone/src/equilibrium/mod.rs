@@ -460,6 +460,20 @@ pub(crate) fn minimum_from(
     intrinsic::solve(problem, Start::Shape(shape), proceed)
 }
 
+/// A shape near to the minimum that a search finds from a shape on the uniform mesh of the problem's number of elements;
+/// `None` if it finds none. `passed` is told the shapes on the way, each with its barrier in mean R_f/U, and ends the search
+/// by `Break`.
+pub(crate) fn near_minimum_from(
+    problem: &Problem,
+    shape: &BeltPoint,
+    passed: &mut dyn FnMut(f64, &BeltPoint) -> ControlFlow<()>,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Option<BeltPoint> {
+    let program = problem.program(problem.elements());
+    let found = search::Search::of(problem).explore(&program, shape.clone(), passed, proceed);
+    (found.outcome == stagewise::Outcome::Converged).then_some(found.at.point)
+}
+
 /// The minimum next to a shape on the uniform mesh of the problem's number of elements.
 pub(crate) fn minimum_next_to(
     problem: &Problem,

@@ -277,6 +277,24 @@ impl Search {
         stagewise::minimise(program, &self.interior_point(barrier), start, proceed)
     }
 
+    /// Searches from a shape of the same mesh as from afar, to a loose tolerance and with few iterations; `passed` is told every
+    /// solution of a barrier problem, with its barrier in mean R_f/U, and interrupts by `Break`.
+    pub(super) fn explore(
+        &self,
+        program: &BeltProgram,
+        shape: BeltPoint,
+        passed: &mut dyn FnMut(f64, &BeltPoint) -> ControlFlow<()>,
+        proceed: &mut Proceed,
+    ) -> Solution<BeltPoint> {
+        /// Largest residual, lengths in U and energy in mean R_f/U.
+        const LOOSE: f64 = 1e-3;
+        let settings = Settings {
+            tolerance: self.tolerance.max(LOOSE),
+            ..self.interior_point(self.settings.cold_barrier)
+        };
+        stagewise::minimise_past(program, &settings, inside(program, shape), passed, proceed)
+    }
+
     fn interior_point(&self, barrier: f64) -> Settings {
         Settings {
             tolerance: self.tolerance,

@@ -144,6 +144,20 @@ pub fn minimise<P: Program<X, U, N>, const X: usize, const U: usize, const N: us
     }
 }
 
+/// As [`minimise`] where the objective is not small. `passed` is told the solution of every barrier problem but the last, with
+/// its barrier parameter, and interrupts by `Break`: from solutions near to each other two searches go the same way.
+pub fn minimise_past<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>(
+    program: &P,
+    settings: &Settings,
+    start: P::Point,
+    passed: &mut dyn FnMut(f64, &P::Point) -> ControlFlow<()>,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Solution<P::Point> {
+    let mut interior_point = InteriorPoint::new(program, *settings, start);
+    let outcome = interior_point.iterate_past(passed, proceed);
+    interior_point.finish(outcome)
+}
+
 /// A minimum found from a stationary point nearby, with its multipliers, and from nowhere else: in the units of what the
 /// objective is there where it is small, as [`minimise`] ends.
 ///
@@ -319,6 +333,15 @@ impl<'a, P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>
     }
 
     fn iterate(&mut self, proceed: &mut dyn FnMut() -> ControlFlow<()>) -> Outcome {
+        self.iterate_past(&mut |_, _| ControlFlow::Continue(()), proceed)
+    }
+
+    /// Iterates, and tells the solution of every barrier problem, with the parameter of its barrier.
+    fn iterate_past(
+        &mut self,
+        passed: &mut dyn FnMut(f64, &P::Point) -> ControlFlow<()>,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Outcome {
         if !self.admissible {
             return Outcome::Inadmissible;
         }
@@ -336,10 +359,14 @@ impl<'a, P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>
             if self.is_interrupted(proceed) {
                 return Outcome::Interrupted;
             }
+            let barrier = self.iterate.barrier.parameter;
             if self
                 .iterate
                 .lower_barrier(&residuals, self.settings.tolerance)
             {
+                if passed(barrier, &self.iterate.point).is_break() {
+                    return Outcome::Interrupted;
+                }
                 self.filter.clear();
                 self.progress = Progress::NONE;
             }

@@ -41,7 +41,7 @@ where
     /// Length of the longest step along the curve; in [`Scales::distance`].
     const LONGEST: f64 = 0.05;
     /// Largest count of stations of the curve; a number.
-    const STATIONS: usize = 80;
+    const STATIONS: usize = 60;
     /// Stiffness of a stiff mode, so that a load of strength 1 displaces it by 1; in [`Scales::eigenvalue`].
     const STIFF: f64 = 300.0;
     /// Strength of the largest load; in [`Scales::distance`].

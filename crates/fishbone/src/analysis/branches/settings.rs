@@ -9,18 +9,27 @@ use std::ops::ControlFlow;
 /// scenarios tried.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SearchSettings {
-    /// Greatest number of elements of the mesh on which the search goes on until its equilibria are confirmed.
+    /// Greatest number of elements of the mesh on which the search begins: from starts, and with modal loads.
+    pub coarse_elements: usize,
+    /// Greatest number of elements of the mesh on which it goes on, from sums of waves and with perturbations, until its
+    /// equilibria are confirmed.
     pub elements: usize,
+    /// Highest barrier at which a search may be known by the shape that it passes, in mean R_f/U: higher ones make shapes
+    /// alike that go different ways afterwards.
+    pub highest_barrier: f64,
     /// Greatest count of iterations of a search for a minimum, a number.
     pub iterations: usize,
     /// Waves of bend, laid over every arch and the straight belt; amplitudes in 1/U.
     pub bend_waves: Vec<Wave>,
     /// Waves of rib slope, each laid over with every wave of bend; amplitudes, a number.
     pub slope_waves: Vec<Wave>,
-    /// Greatest count of sums of waves from which the search starts as well, a number.
+    /// Greatest count of sums of waves from which the search starts on either mesh, a number.
     pub sums: usize,
-    /// Sums of waves at a time, a number: the search goes on to the next as long as such a batch leads to anything new.
+    /// Sums of waves at a time, a number: the search goes on to the next as long as such a batch leads to anything unlike
+    /// what is known.
     pub batch: usize,
+    /// Searches for minima at a time, a number: each of them ends where it comes to the way of one of those before.
+    pub searches_at_a_time: usize,
     /// Greatest count of perturbed minima, a number.
     pub perturbed: usize,
     /// Modes along which a minimum is perturbed, a number.
@@ -73,8 +82,10 @@ impl Default for SearchSettings {
             waves.iter().map(wave).collect()
         };
         Self {
+            coarse_elements: 40,
             elements: 80,
-            iterations: 300,
+            highest_barrier: 0.1,
+            iterations: 200,
             bend_waves: waves(&[
                 (0.0, 0.0),
                 (0.0, 4.0),
@@ -87,14 +98,15 @@ impl Default for SearchSettings {
                 (3.0, -12.0),
             ]),
             slope_waves: waves(&[(1.0, 0.0), (1.0, 0.5), (1.0, -0.5), (2.0, 0.5), (2.0, -0.5)]),
-            sums: 4000,
-            batch: 1024,
+            sums: 2048,
+            batch: 160,
+            searches_at_a_time: 32,
             perturbed: 32,
             perturbed_modes: 4,
             perturbations: vec![0.1, -0.1, 0.3, -0.3],
             continued: 4,
             at_a_time: 4,
-            loaded_modes: [4, 3, 0],
+            loaded_modes: [3, 2, 0],
             off_saddle: 0.01,
             refinement: 2,
             same_level: 1e-4,
