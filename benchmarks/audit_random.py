@@ -73,7 +73,7 @@ def finer(made: Json, found: fb.Equilibrium) -> Json | None:
         return None
     board = Board(made)
     scale = max(abs(found.energy), abs(found.elastic_energy), NOTHING * board.sheet[0] / board.length)
-    estimates = max(LEAST_ERROR, HONESTY * (found.error.energy + fine.error.energy))
+    estimates = max(LEAST_ERROR, HONESTY * float(np.nansum([found.error.energy, fine.error.energy])))
     stated = np.nanmax([ACCURACY, *found.error])
     return {
         "change": abs(found.energy - fine.energy) / scale,

@@ -258,7 +258,7 @@ impl Equilibrium {
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Option<Self> {
         /// Displacement of nodes up to which the refined shape is the same equilibrium, in U.
-        const NEAR: f64 = 0.1;
+        const NEAR: f64 = 0.05;
         let problem = self.problem.with_elements(elements).ok()?;
         let found = self.led_to(&problem, proceed)?;
         (self.displacement(&found) <= NEAR).then_some(found)

@@ -72,7 +72,7 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         const INDEPENDENT: f64 = 1e-4;
         /// Eigenvalue below which conditions depend on each other; dimensionless. A belt between two clamps with a slack of
         /// s lengths has some 0.1 s.
-        const DEPENDENT: f64 = 1e-15;
+        const DEPENDENT: f64 = 1e-11;
         // A link between two of these elements would not be moved by any of them.
         let every = self.pieces.len() / FEW;
         if every > 1
