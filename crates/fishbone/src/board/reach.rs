@@ -268,17 +268,19 @@ mod tests {
                 foot.point.rib_slope += lean;
                 let end = board.ends(&foot)[side];
                 let v = end.v;
-                let edge = board.chains.edges[side][end.place as usize];
+                let edges = &board.chains.edges[side];
+                let edge = edges[end.place as usize];
+                let is_end_line = [0, edges.len() - 1].contains(&(end.place as usize));
                 let missed = (edge.curve.point(end.place.fract()) - end.flat).norm();
                 let u = 0.5 * (spine.u[element] + spine.u[element + 1]);
                 // Left out: ribs that may leave through an end line, and ribs that pass by all edges of their side.
-                if u < 0.2 || u > spine.length() - 0.2 || missed > 1e-6 {
+                if u < 0.2 || u > spine.length() - 0.2 || is_end_line || missed > 1e-6 {
                     continue;
                 }
                 let rib = MiddleRib { foot, convergence: 1.0 / v, length: 0.0 };
                 let slope = rib.foot.point.rib_slope;
-                let edges = [rib.nearest_edge(&board, side), rib.own_arc(&board, side)];
-                let active = edges.into_iter().flatten().map(|edge| edge.slack(slope, 1.0 / v));
+                let near = [rib.nearest_edge(&board, side), rib.own_arc(&board, side)];
+                let active = near.into_iter().flatten().map(|edge| edge.slack(slope, 1.0 / v));
                 let geodesic = spine.pieces[element].geodesic();
                 let own = (geodesic == 0.0).then(|| 1.0 - 0.5 * WIDTH / v.abs());
                 let least = active.chain(own).fold(f64::INFINITY, f64::min);
