@@ -282,16 +282,22 @@ struct Cut {
 }
 
 /// The chain without gaps: at each gap the nearest pieces that cross are cut at their crossing, and the pieces between them
-/// are left out.
+/// are left out. Pieces that graze each other may leave the gap as it was by rounding: then it is bridged.
 fn mended(mut edges: Vec<Edge>, is_open: bool, tolerance: f64) -> Vec<Edge> {
-    while !gaps(&edges, tolerance).is_empty() {
-        let Some(cut) = nearest_cut(&edges, &gaps(&edges, tolerance), is_open) else {
+    let mut open = gaps(&edges, tolerance);
+    while !open.is_empty() {
+        let known = (edges.len(), open.len());
+        let cut = nearest_cut(&edges, &open, is_open);
+        if let Some(cut) = &cut {
+            edges[cut.before] = edges[cut.before].part(0.0, cut.at[0]);
+            edges[cut.after] = edges[cut.after].part(cut.at[1], 1.0);
+            edges.drain(cut.before + 1..cut.after);
+        }
+        open = gaps(&edges, tolerance);
+        if edges.len() == known.0 && open.len() >= known.1 {
             bridge(&mut edges, tolerance);
             break;
-        };
-        edges[cut.before] = edges[cut.before].part(0.0, cut.at[0]);
-        edges[cut.after] = edges[cut.after].part(cut.at[1], 1.0);
-        edges.drain(cut.before + 1..cut.after);
+        }
     }
     edges
 }
