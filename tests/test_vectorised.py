@@ -42,9 +42,9 @@ def output(*command):
 def kernels():
     """Arithmetic instructions of each function that is made for AVX, by the registers that they work on."""
     if sys.platform != "linux" or platform.machine() != "x86_64":
-        pytest.skip("x86-64 Linux only")
+        pytest.skip("the instructions that are counted are those of x86-64, in the ELF files of Linux")
     if not (shutil.which("objdump") and shutil.which("readelf")):
-        pytest.skip("objdump or readelf is missing: install binutils")
+        pytest.skip("the core is taken apart by objdump and readelf, and one is missing: install binutils")
     starts = sorted(int(start, 16) for start in START.findall(output("readelf", "--debug-dump=frames", _core.__file__)))
     found = {}
     for line in ARITHMETIC.finditer(output("objdump", "-d", "--no-show-raw-insn", _core.__file__)):

@@ -461,7 +461,7 @@ pub(crate) fn minimum_from(
 }
 
 /// A shape near to the minimum that a search finds from a shape on the uniform mesh of the problem's number of elements;
-/// `None` if it finds none. `passed` is told the shapes on the way, each with its barrier in mean R_f/U, and ends the search
+/// `None` if it finds none. `passed` gets the shapes on the way, each with its barrier in mean R_f/U, and ends the search
 /// by `Break`.
 pub(crate) fn near_minimum_from(
     problem: &Problem,

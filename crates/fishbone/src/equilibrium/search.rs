@@ -277,7 +277,7 @@ impl Search {
         stagewise::minimise(program, &self.interior_point(barrier), start, proceed)
     }
 
-    /// Searches from a shape of the same mesh as from afar, to a loose tolerance and with few iterations; `passed` is told every
+    /// Searches from a shape of the same mesh as from afar, to a loose tolerance and with few iterations; `passed` gets every
     /// solution of a barrier problem, with its barrier in mean R_f/U, and interrupts by `Break`.
     pub(super) fn explore(
         &self,

@@ -110,7 +110,7 @@ pub(super) fn on_side_of_bulge(
     }
     let problem = &found.problem;
     let images = Image::all(problem, solved);
-    let [twins, others]: [Vec<_>; 2] =
+    let [symmetric, others]: [Vec<_>; 2] =
         [true, false].map(|is_twin| images.iter().filter(|i| i.is_twin == is_twin).collect());
     let mut iterations = found.iterations;
     let mut is_on_side = |mut other: Equilibrium| {
@@ -118,8 +118,8 @@ pub(super) fn on_side_of_bulge(
         other.iterations = iterations;
         (other.is_minimum() && other.side() > 0).then_some(other)
     };
-    for twin in twins {
-        if let Some(other) = is_on_side(twin.twin(&found, solved, proceed)) {
+    for image in symmetric {
+        if let Some(other) = is_on_side(image.twin(&found, solved, proceed)) {
             return other;
         }
     }
@@ -380,7 +380,7 @@ impl Image {
         let bulge = problem.bulge().normalize();
         let is_right = |image: &Self| side(image.mean_distance(&solved.program).dot(&bulge)) > 0;
         let mut images: Vec<_> = Self::of_mirrors(solved, &bulge).filter(is_right).collect();
-        // Rounding must not choose between twins.
+        // Rounding must not choose between symmetry images.
         let rank = |image: &Self| if image.is_twin { 0.0 } else { image.miss };
         images.sort_by(|a, b| rank(a).total_cmp(&rank(b)));
         images.dedup_by(|b, a| a.shape.distance(&b.shape) <= MET);

@@ -144,7 +144,7 @@ pub fn minimise<P: Program<X, U, N>, const X: usize, const U: usize, const N: us
     }
 }
 
-/// As [`minimise`] where the objective is not small. `passed` is told the solution of every barrier problem but the last, with
+/// As [`minimise`] where the objective is not small. `passed` gets the solution of every barrier problem but the last, with
 /// its barrier parameter, and interrupts by `Break`: from solutions near to each other two searches go the same way.
 pub fn minimise_past<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize>(
     program: &P,
