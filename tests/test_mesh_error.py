@@ -256,8 +256,24 @@ def test_a_lower_tolerance_leaves_the_mesh_and_the_estimate_as_they_are(elements
     np.testing.assert_allclose(fine.error, coarse.error, rtol=1e-3)
 
 
+@pytest.mark.parametrize("elements", [300, 1000, 4000])
+def test_the_lowest_tolerance_is_met_on_every_mesh(elements: int) -> None:
+    found = hinge(1e-13, elements)
+    assert found.status == "converged"
+    assert max(found.residuals) <= 1e-13
+    assert found.energy == pytest.approx(hinge(1e-8, elements).energy, rel=1e-8)
+
+
+def pulled(tolerance: float) -> fb.Equilibrium:
+    """A strip whose end is pulled with a force in which a tolerance is far below rounding."""
+    clamp = {"at": "start", "position": CLAMP, "rotation": [0.0, 0.0, 0.4]}
+    loads = {"points": [{"at": "end", "force": [0.0, 1e6, 0.0]}]}
+    tables = scenario([clamp], loads=loads, solver={"tolerance": tolerance, "elements": 80})
+    return fb.solve(fb.Scenario.from_dict(tables))
+
+
 def test_a_tolerance_below_rounding_is_named() -> None:
-    found = hinge(1e-13, 1000)
+    found = pulled(1e-13)
     assert found.status == "not_converged"
     assert found.message.startswith("solver.tolerance, 1.0e-13, is below what rounding leaves")
-    assert found.energy == pytest.approx(hinge(1e-8, 1000).energy, rel=1e-8)
+    assert found.energy == pytest.approx(pulled(1e-8).energy, rel=1e-8)

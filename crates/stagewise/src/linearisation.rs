@@ -127,6 +127,25 @@ impl<const X: usize, const U: usize, const N: usize> Linearisation<X, U, N> {
         self.chain.second_derivative(&self.diagonal, a, b) + pairs.sum::<f64>()
     }
 
+    /// Change of the gradient by the controls of a node that a change of the controls of this node and its neighbours makes at
+    /// most, whatever the signs.
+    pub(crate) fn gradient_change(
+        &self,
+        node: usize,
+        change: impl Fn(usize) -> SVector<f64, U>,
+    ) -> SVector<f64, U> {
+        let stages = &self.diagonal.controls;
+        let own = change(node);
+        let before = node.checked_sub(1).map(|k| {
+            let mixed = stages[k].mixed.abs().tr_mul(&change(k));
+            mixed + stages[k].second.abs() * own
+        });
+        let after = stages
+            .get(node)
+            .map(|stage| stage.first.abs() * own + stage.mixed.abs() * change(node + 1));
+        before.into_iter().chain(after).sum()
+    }
+
     /// Index of a block among the terms at single nodes; blocks of inequalities follow blocks of equalities.
     pub(crate) fn term(&self, block: usize) -> usize {
         self.terms[block]

@@ -4,7 +4,7 @@ use crate::interior_point::Residuals;
 use crate::layout::Layout;
 use crate::linear::chain::NodeVector;
 use crate::linearisation::Linearisation;
-use nalgebra::SMatrix;
+use nalgebra::{SMatrix, SVector};
 
 /// Objective and constraints of a programme at a point.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -146,6 +146,14 @@ pub trait Program<const X: usize, const U: usize, const N: usize> {
         Vec::new()
     }
 
+    /// Rounding of the controls of a node: how far they may be from the nearest numbers. The gradient at a point is known no
+    /// better than the second derivative times this.
+    ///
+    /// By default none.
+    fn rounding(&self, _point: &Self::Point, _node: usize) -> SVector<f64, U> {
+        SVector::zeros()
+    }
+
     /// Residuals with given multipliers as the tolerance counts them.
     ///
     /// By default as they are.
@@ -202,6 +210,10 @@ impl<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> Progra
 
     fn symmetries(&self, point: &Self::Point) -> Vec<Vec<NodeVector<N>>> {
         (*self).symmetries(point)
+    }
+
+    fn rounding(&self, point: &Self::Point, node: usize) -> SVector<f64, U> {
+        (*self).rounding(point, node)
     }
 
     fn judged(&self, residuals: Residuals, multipliers: &Multipliers) -> Residuals {

@@ -7,7 +7,7 @@ use crate::linear::PairMatrix;
 use crate::linear::chain::NodeVector;
 use crate::linearisation::Linearisation;
 use crate::program::{Multipliers, Program, Scales, Stationary, Values};
-use nalgebra::SMatrix;
+use nalgebra::{SMatrix, SVector};
 
 /// A programme whose objective is near to zero, in units in which its numbers are of order one: in the unit ε of the objective,
 /// and with equalities in √ε, as an objective that is a square falls with the square of what the equalities ask for.
@@ -148,6 +148,10 @@ impl<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> Progra
 
     fn symmetries(&self, point: &Self::Point) -> Vec<Vec<NodeVector<N>>> {
         self.program.symmetries(point)
+    }
+
+    fn rounding(&self, point: &Self::Point, node: usize) -> SVector<f64, U> {
+        self.program.rounding(point, node)
     }
 
     fn judged(&self, residuals: Residuals, multipliers: &Multipliers) -> Residuals {

@@ -56,7 +56,7 @@ pub enum Outcome {
 /// Residuals of the first-order conditions, max-norms.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Residuals {
-    /// Gradient of the Lagrangian by the unknowns.
+    /// Gradient of the Lagrangian by the unknowns, beyond what [rounding](Program::rounding) of the controls makes of it.
     pub stationarity: f64,
     /// Violation of the equalities.
     pub constraint: f64,

@@ -5,7 +5,7 @@ use super::{Residuals, UNBOUNDED};
 use crate::linear::chain::NodeVector;
 use crate::linear::{Inertia, Kkt};
 use crate::program::{Multipliers, Program, Scales, Values};
-use crate::{largest, largest_entry};
+use crate::{larger, largest};
 
 /// A point with its multipliers, the derivatives and the Newton step at the point, and the trial point.
 pub(crate) struct PrimalDual<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> {
@@ -91,13 +91,23 @@ impl<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> Primal
         self.stationarity()
     }
 
-    /// Largest entry of the gradient less the inequalities' multipliers times their gradients.
+    /// Largest entry of the gradient less the inequalities' multipliers times their gradients, beyond rounding of the controls.
     fn stationarity(&mut self) -> f64 {
         let multipliers = &self.multipliers.inequalities;
         let linear = &self.kkt.linear;
         linear.add_slack_gradients(|row| -multipliers[row], &mut self.gradient);
         linear.gather_gradient(&mut self.gradient);
-        largest_entry(&self.gradient)
+        let rounding = |node: usize| self.program.rounding(&self.point, node);
+        let nodes = self.gradient.iter().enumerate();
+        let beyond = nodes.map(|(node, gradient)| {
+            let mut beyond = *gradient;
+            let by_controls = linear.gradient_change(node, rounding);
+            for (entry, rounded) in beyond.iter_mut().skip(X).zip(&by_controls) {
+                *entry = beyond_rounding(*entry, *rounded);
+            }
+            largest(beyond.iter())
+        });
+        beyond.fold(0.0, larger)
     }
 
     fn complementarity(&self, parameter: f64) -> f64 {
@@ -257,5 +267,17 @@ impl<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> Primal
     pub(crate) fn take_trial(&mut self) {
         std::mem::swap(&mut self.point, &mut self.trial);
         std::mem::swap(&mut self.values, &mut self.trial_values);
+    }
+}
+
+/// Size of an entry of the gradient beyond what rounding makes of it; NaN where the entry is NaN.
+fn beyond_rounding(entry: f64, rounded: f64) -> f64 {
+    /// Greatest amount that still counts as rounding, in the unit of the gradient.
+    const MOST: f64 = 1e-6;
+    let size = entry.abs();
+    match rounded <= MOST {
+        true if size <= rounded => 0.0,
+        true => size - rounded,
+        false => size,
     }
 }

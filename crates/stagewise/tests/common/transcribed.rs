@@ -50,6 +50,11 @@ pub(crate) trait Problem<const X: usize, const U: usize, const N: usize>: Clone 
         SMatrix::identity() * Problem::layout(self).node_weights()[node]
     }
 
+    /// Rounding of the controls of a node.
+    fn rounding(&self, _u: [f64; U]) -> [f64; U] {
+        [0.0; U]
+    }
+
     /// Whether the second derivatives of constraints between pairs are given to the solver.
     fn gives_pair_hessians(&self) -> bool {
         true
@@ -176,6 +181,11 @@ impl<P: Problem<X, U, N>, const X: usize, const U: usize, const N: usize> Progra
 
     fn layout(&self) -> Layout {
         self.problem.layout()
+    }
+
+    fn rounding(&self, point: &Self::Point, node: usize) -> SVector<f64, U> {
+        let u = point.u[node].data.0[0];
+        SVector::from(self.problem.rounding(u))
     }
 
     fn evaluate(&self, point: &mut Self::Point, values: &mut Values) -> bool {

@@ -4,7 +4,7 @@ use super::{BeltPoint, BeltProgram, DeadForce, Piece, ROWS, add_wrench, rows_of,
 use crate::geometry::{Pose, Twist, hat};
 use crate::strip::density::{Density, Derivatives, LANES, Loaded};
 use crate::strip::element::Element;
-use nalgebra::{Matrix3, Matrix3x6, Matrix6, Vector6};
+use nalgebra::{Matrix3, Matrix3x6, Matrix6, SVector, Vector6};
 use stagewise::{Layout, Linearisation, Multipliers, NodeVector, Program, StageMatrix, Values};
 
 impl<D: Density<F>, const F: usize, const N: usize> Program<6, F, N> for BeltProgram<D, F, N> {
@@ -132,6 +132,10 @@ impl<D: Density<F>, const F: usize, const N: usize> Program<6, F, N> for BeltPro
         }
         let twist = Twist::from_vector(&(length * step[0].fixed_rows::<6>(0)));
         into.poses[0] = Pose::exp(&twist) * point.poses[0];
+    }
+
+    fn rounding(&self, point: &BeltPoint<F>, node: usize) -> SVector<f64, F> {
+        point.fields[node].abs() * f64::EPSILON
     }
 
     /// The mean square displacement of the board, in U², of uniform weight: a node carries half of both pieces beside it, as
