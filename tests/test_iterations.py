@@ -17,7 +17,7 @@ ITERATIONS = {
     "example1": 19,
     "example2": 31,
     "hinge": 83,
-    "mobius": 121,
+    "mobius": 92,
     "planar": 10,
     "polystyrene": 25,
     "twist": 65,

@@ -165,6 +165,32 @@ def test_band_keeps_three_half_turns(width: float, energy: float, hand: int) -> 
     assert band.energy == pytest.approx(energy, rel=2e-4)
 
 
+@pytest.mark.parametrize("width", [0.1, 0.3, 0.4, 0.5])
+def test_wide_bands_converge_on_every_mesh(width: float) -> None:
+    """The error of the energy falls with the square of the length of the elements."""
+
+    def energy(elements: int) -> float:
+        band = solve(board([straight(1.0)], [], closed=True, half_turns=1, width=width, elements=elements))
+        assert band.stable
+        assert band.half_turns == 1
+        assert max(band.residuals) <= 1e-8
+        return band.energy
+
+    energies = [energy(elements) for elements in (160, 320, 480, 640, 1280)]
+    steps = energies[0] - energies[1], energies[1] - energies[3], energies[3] - energies[4]
+    assert steps[0] / steps[1] == pytest.approx(4.0, rel=0.2)
+    assert steps[1] / steps[2] == pytest.approx(4.0, rel=0.2)
+    assert energies[1] > energies[2] > energies[3]
+
+
+def test_default_mesh_carries_the_widest_band() -> None:
+    band = solve(board([straight(1.0)], [], closed=True, half_turns=1, width=0.5))
+    error = band.error
+    assert error is not None
+    assert max(error.energy, error.force, error.radius) <= 1e-3
+    assert [warning for warning in band.warnings if "solver.accuracy" in warning] == []
+
+
 def test_band_that_keeps_no_half_turns_is_warned_of() -> None:
     band = solve(board([straight(1.0)], [], closed=True, half_turns=4, width=0.1, elements=80))
     assert band.half_turns == 0

@@ -10,6 +10,7 @@ mod lifted;
 mod refinement;
 mod search;
 mod side;
+mod sliding;
 mod spans;
 mod stability;
 mod warnings;

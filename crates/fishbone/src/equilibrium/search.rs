@@ -274,7 +274,15 @@ impl Search {
         barrier: f64,
         proceed: &mut Proceed,
     ) -> Solution<BeltPoint> {
-        stagewise::minimise(program, &self.interior_point(barrier), start, proceed)
+        match self.with_square_seam(program, &start, barrier, proceed) {
+            None => stagewise::minimise(program, &self.interior_point(barrier), start, proceed),
+            Some(found) if is_done(&found) => found,
+            Some(found) => {
+                let settings = self.interior_point(barrier);
+                let free = stagewise::minimise(program, &settings, start, proceed);
+                free.after(found.iterations)
+            }
+        }
     }
 
     /// Searches from a shape of the same mesh as from afar, to a loose tolerance and with few iterations; `passed` gets every
@@ -295,7 +303,7 @@ impl Search {
         stagewise::minimise_past(program, &settings, inside(program, shape), passed, proceed)
     }
 
-    fn interior_point(&self, barrier: f64) -> Settings {
+    pub(super) fn interior_point(&self, barrier: f64) -> Settings {
         Settings {
             tolerance: self.tolerance,
             iterations: self.settings.iterations,
@@ -306,7 +314,7 @@ impl Search {
 }
 
 /// Whether the search is over.
-fn is_done(solution: &Solution<BeltPoint>) -> bool {
+pub(super) fn is_done(solution: &Solution<BeltPoint>) -> bool {
     solution.outcome == Outcome::Interrupted || rank(solution) == 2
 }
 
