@@ -89,3 +89,28 @@ def test_clamps_of_a_strip_are_never_out_of_reach(seed: int) -> None:
         tables["belt"]["segments"] = [{"kind": "arc", "length": 1.0, "curvature": geodesic}]
     tables["solver"] = {"elements": 20}
     assert solve_any(tables).status != "infeasible"
+
+
+WIDE = {"segments": [{"kind": "arc", "length": 1.0, "curvature": math.pi / 2.0}], "width": 0.3}
+
+
+def quarter_arc(lift: float) -> dict[str, Any]:
+    """A quarter of a wide ring, its ends held as on the flat board but for a lift of one end off the plane."""
+    radius = 2.0 / math.pi
+    end = support("end", [lift, radius, radius], [math.pi / 2.0, 0.0, 0.0])
+    tables = belt([support("start", [0, 0, 0], [0, 0, 0]), end], width=WIDE["width"])
+    tables["belt"] |= WIDE
+    return tables
+
+
+def test_end_beyond_the_way_along_an_arc_is_infeasible_at_once() -> None:
+    """From end to end the shortest way on the board is two tangents of the inner edge, and the edge between them."""
+    radius, inner = 2.0 / math.pi, 2.0 / math.pi - 0.15
+    turn = math.acos(inner / radius)
+    longest = 2.0 * inner * math.tan(turn) + inner * (math.pi / 2.0 - 2.0 * turn)
+    lift = math.sqrt(longest**2 - 2.0 * radius**2)
+    found = solve_any(quarter_arc(1.01 * lift))
+    assert (found.status, found.iterations) == ("infeasible", 0)
+    [belt_length] = [float(word) for word in found.message.split("(")[1].split(")")[:1]]
+    assert longest <= belt_length <= (1.0 + 1e-4) * longest
+    assert solve_any(quarter_arc(0.0)).status == "converged"

@@ -21,7 +21,7 @@ struct Stretch {
 
 /// An upper bound of the length of the shortest path on the board from one point to another: the length of the straight line
 /// where the board between them is straight, else of the shortest of the paths along the spine or an edge and along the two
-/// square ribs, and of the path from mitre to mitre across a board of straight stretches and corners.
+/// square ribs, and of the path drawn tight between the edges.
 ///
 /// On a closed belt the path goes the shorter way round; the points must be on the spine.
 pub(super) fn distance([a, b]: [BoardPoint; 2], belt: &BeltSpec) -> f64 {
@@ -42,64 +42,133 @@ pub(super) fn distance([a, b]: [BoardPoint; 2], belt: &BeltSpec) -> f64 {
         Some((a.v - edge).abs() + along + (b.v - edge).abs())
     });
     let ends = if a.u <= b.u { [a.v, b.v] } else { [b.v, a.v] };
-    let across = across_corners(&stretches, ends, half);
-    let paths = by_edge.chain(across);
+    let tight = drawn_tight(&stretches, ends, half);
+    let paths = by_edge.chain(tight);
     paths.fold(a.v.abs() + way + b.v.abs(), f64::min)
 }
 
-/// A mitre: the points of the board at a corner, by their distance from the spine.
-struct Mitre {
-    /// The corner of the spine.
-    corner: Vector2<f64>,
-    /// Place of a point of the mitre off the corner, per distance from the spine.
-    along: Vector2<f64>,
+/// Two points of the board, on the −ζ and on the +ζ side, between which a path passes.
+type Gate = [Vector2<f64>; 2];
+
+/// Length of the shortest path through the gates of a board, between points off its first and its last square rib; `None` of a
+/// board with a corner at its start, or with mitres that meet.
+fn drawn_tight(stretches: &[Stretch], ends: [f64; 2], half: f64) -> Option<f64> {
+    let normal = |heading: f64| Vector2::new(-heading.sin(), heading.cos());
+    let (gates, end, heading) = gates(stretches, half)?;
+    let first = ends[0] * normal(0.0);
+    let last = end + ends[1] * normal(heading);
+    Some(shortest_through(first, &gates, last))
 }
 
-/// Length of a path from mitre to mitre across a board of straight stretches and corners, between points off its first and
-/// its last square rib; `None` of a board with arcs, with a corner at its start, or with mitres that meet.
-///
-/// Parts of the board between two mitres are convex, so that the path is straight there. It is the shortest path once every
-/// point on a mitre is where the line between its neighbours crosses the mitre, or on the edge next to that. The points are
-/// moved there in turn; every such path is on the board.
-fn across_corners(stretches: &[Stretch], ends: [f64; 2], half: f64) -> Option<f64> {
-    /// Rounds over all mitres, a number.
-    const ROUNDS: usize = 50;
+/// The gates of a board that starts at the origin along the first axis, then the end of its spine and the heading there: the
+/// mitres of corners, and on arcs square ribs so close to each other that the lines between their gates are on the board.
+fn gates(stretches: &[Stretch], half: f64) -> Option<(Vec<Gate>, Vector2<f64>, f64)> {
+    /// Largest turn between the square ribs of an arc, in rad.
+    const TURN: f64 = 0.01;
     let cuts = |stretch: &Stretch| half * (0.5 * stretch.corner).tan().abs();
     let after = stretches.iter().skip(1).map(cuts).chain([0.0]);
-    let mut legs = stretches.iter().zip(after);
-    let is_convex =
-        |(leg, after): (&Stretch, f64)| leg.curvature == 0.0 && leg.length >= cuts(leg) + after;
-    if stretches.first()?.corner != 0.0 || !legs.all(is_convex) {
+    let are_apart = |(leg, after): (&Stretch, f64)| leg.length >= cuts(leg) + after;
+    if stretches.first()?.corner != 0.0 || !stretches.iter().zip(after).all(are_apart) {
         return None;
     }
-    let normal = |heading: f64| Vector2::new(-heading.sin(), heading.cos());
     let (mut at, mut heading) = (Vector2::zeros(), 0.0f64);
-    let first = at + ends[0] * normal(heading);
-    let mut mitres = Vec::new();
+    let mut gates = Vec::new();
+    let mut before: Option<&Stretch> = None;
+    let reach = |stretch: &Stretch| reach_beside(stretch.curvature, half, TURN);
     for stretch in stretches {
-        if stretch.corner != 0.0 {
-            let normals = normal(heading) + normal(heading + stretch.corner);
-            mitres.push(Mitre {
-                corner: at,
-                along: normals / (1.0 + stretch.corner.cos()),
-            });
-            heading += stretch.corner;
+        if let Some(before) = before.replace(stretch) {
+            let are_straight = before.curvature == 0.0 && stretch.curvature == 0.0;
+            let [a, b] = [before, stretch].map(reach);
+            // A mitre beside an arc meets its edges elsewhere: there the path goes by way of the spine.
+            let reach = match stretch.corner == 0.0 || are_straight {
+                true => [a[0].min(b[0]), a[1].min(b[1])],
+                false => [0.0; 2],
+            };
+            gates.push(gate(at, heading, stretch.corner, reach));
         }
-        at += stretch.length * Vector2::new(heading.cos(), heading.sin());
-    }
-    let last = at + ends[1] * normal(heading);
-    let corners = mitres.iter().map(|mitre| mitre.corner);
-    let mut path: Vec<_> = [first].into_iter().chain(corners).chain([last]).collect();
-    for _ in 0..ROUNDS {
-        for (k, mitre) in mitres.iter().enumerate() {
-            let (before, chord) = (path[k], path[k + 2] - path[k]);
-            let v = (before - mitre.corner).perp(&chord) / mitre.along.perp(&chord);
-            if v.is_finite() {
-                path[k + 1] = mitre.corner + v.clamp(-half, half) * mitre.along;
+        heading += stretch.corner;
+        let turn = stretch.curvature * stretch.length;
+        let parts = (turn.abs() / TURN).ceil().max(1.0);
+        let step = |heading: f64| {
+            let half_turn = 0.5 * turn / parts;
+            let chord = match half_turn == 0.0 {
+                true => stretch.length / parts,
+                false => 2.0 * half_turn.sin() / stretch.curvature,
+            };
+            let along = heading + half_turn;
+            chord * Vector2::new(along.cos(), along.sin())
+        };
+        for part in 1..=parts as usize {
+            at += step(heading);
+            heading += turn / parts;
+            if part < parts as usize {
+                gates.push(gate(at, heading, 0.0, reach(stretch)));
             }
         }
     }
-    Some(path.windows(2).map(|ends| (ends[1] - ends[0]).norm()).sum())
+    Some((gates, at, heading))
+}
+
+/// Distances from the spine, towards −ζ and towards +ζ, up to which lines between the square ribs of a stretch, a turn
+/// apart, stay on the board.
+fn reach_beside(curvature: f64, half: f64, turn: f64) -> [f64; 2] {
+    let radius = curvature.abs().recip();
+    // Of a sharper arc the inner side is trimmed.
+    let inner_edge = if half < radius { radius - half } else { radius };
+    let inner = radius - inner_edge / turn.cos();
+    match curvature {
+        k if k > 0.0 => [half, inner],
+        k if k < 0.0 => [inner, half],
+        _ => [half; 2],
+    }
+}
+
+/// The gate on the mitre of a corner, or on the square rib where there is none.
+fn gate(corner: Vector2<f64>, heading: f64, turn: f64, reach: [f64; 2]) -> Gate {
+    let middle = heading + 0.5 * turn;
+    let along = Vector2::new(-middle.sin(), middle.cos()) / (0.5 * turn).cos();
+    [corner - reach[0] * along, corner + reach[1] * along]
+}
+
+/// Length of the shortest path from a point through gates to a point. Between two neighbouring gates the board is convex.
+///
+/// The path is straight until a gate turns it: the funnel of straight lines from the last turn through the gates after it is
+/// narrowed from gate to gate, and its nearer side is the next turn where the funnel closes. Source: D. T. Lee and F. P.
+/// Preparata, "Euclidean shortest paths in the presence of rectilinear barriers" (1984).
+fn shortest_through(first: Vector2<f64>, gates: &[Gate], last: Vector2<f64>) -> f64 {
+    let gate = |k: usize| gates.get(k).copied().unwrap_or([last; 2]);
+    let mut length = 0.0;
+    let mut turn = first;
+    let mut next = 0;
+    // Both sides of the funnel, each with the gate after its point.
+    let mut funnel = [(first, 0); 2];
+    while next <= gates.len() {
+        let mut closes = None;
+        for (side, point) in gate(next).into_iter().enumerate() {
+            // Positive towards the other side.
+            let inwards = |from: Vector2<f64>, to: Vector2<f64>| {
+                let sense = if side == 0 { 1.0 } else { -1.0 };
+                sense * (from - turn).perp(&(to - turn))
+            };
+            let (own, other) = (funnel[side].0, funnel[1 - side]);
+            if inwards(own, point) < 0.0 {
+                continue;
+            }
+            if own == turn || inwards(other.0, point) < 0.0 {
+                funnel[side] = (point, next + 1);
+            } else {
+                closes = Some(other);
+                break;
+            }
+        }
+        next += 1;
+        if let Some((point, after)) = closes {
+            length += (point - turn).norm();
+            (turn, next) = (point, after);
+            funnel = [(turn, after); 2];
+        }
+    }
+    length + (last - turn).norm()
 }
 
 /// The stretches between two arc lengths in rising order. A support at a corner holds the frame before it.
@@ -181,8 +250,11 @@ mod tests {
         let belt = belt(vec![arc(FRAC_PI_2, 1.0)]);
         let inner = between([0.0, 0.1], [FRAC_PI_2, 0.1], &belt);
         assert!((inner - 0.9 * FRAC_PI_2).abs() < 1e-12);
+        // From the spine two tangents lead to the inner edge and from it.
         let spine = between([0.0, 0.0], [FRAC_PI_2, 0.0], &belt);
-        assert!((spine - FRAC_PI_2).abs() < 1e-12);
+        let tangents = 2.0 * 0.19f64.sqrt();
+        let round_edge = 0.9 * (FRAC_PI_2 - 2.0 * 0.9f64.acos());
+        assert!((spine - tangents - round_edge).abs() < 1e-4);
     }
 
     #[test]
@@ -222,6 +294,65 @@ mod tests {
         // Before the corner the board is straight; a support at the corner is before it.
         assert!((between([0.1, 0.0], [0.5, 0.0], &belt) - 0.4).abs() < 1e-12);
         assert!((between([0.5, -0.1], [1.2, -0.1], &belt) - 0.6 - 0.1).abs() > 0.05);
+    }
+
+    /// Length of the shortest path between points of a plane that does not enter a circle about the origin.
+    fn round_circle(radius: f64, [a, b]: [Vector2<f64>; 2]) -> f64 {
+        let chord = b - a;
+        let nearest = (a + chord * (-a.dot(&chord) / chord.norm_squared()).clamp(0.0, 1.0)).norm();
+        if nearest >= radius {
+            return chord.norm();
+        }
+        let angles = [a, b].map(|point| (radius / point.norm()).min(1.0).acos());
+        let tangents = angles.map(|angle| radius * angle.tan());
+        let between = a.perp(&b).atan2(a.dot(&b)).abs();
+        tangents[0] + tangents[1] + radius * (between - angles[0] - angles[1])
+    }
+
+    #[test]
+    fn test_way_along_an_arc_is_straight_or_touches_its_inner_edge() {
+        // Half the width is 0.1, and the radius 0.5.
+        for (turn, sign) in [(0.4, 1.0), (0.4, -1.0), (FRAC_PI_2, 1.0), (2.5, -1.0)] {
+            for v in [[0.0, 0.0], [-0.1, 0.05], [0.1, 0.0], [-0.1, -0.1]] {
+                let belt = belt(vec![arc(0.5 * turn, 2.0 * sign)]);
+                let found = between([0.0, v[0]], [0.5 * turn, v[1]], &belt);
+                let at =
+                    |v: f64, angle: f64| (0.5 - sign * v) * Vector2::new(angle.cos(), angle.sin());
+                let shortest = round_circle(0.4, [at(v[0], 0.0), at(v[1], turn)]);
+                assert!(found >= shortest - 1e-12, "{found} {shortest}");
+                assert!(found <= (1.0 + 2e-4) * shortest, "{found} {shortest}");
+            }
+        }
+    }
+
+    #[test]
+    fn test_way_along_a_spiral_goes_round_as_often() {
+        let belt = belt(vec![arc(5.0 * FRAC_PI_2, 1.0), arc(4.0 * FRAC_PI_2, 0.5)]);
+        let found = between([0.0, 0.0], [9.0 * FRAC_PI_2, 0.0], &belt);
+        let edge = 0.9 * 2.5 * FRAC_PI_2 * 2.0 + 1.9 * FRAC_PI_2 * 2.0;
+        assert!(
+            found < 9.0 * FRAC_PI_2 && found > edge - 0.2,
+            "{found} {edge}"
+        );
+    }
+
+    #[test]
+    fn test_way_through_arcs_to_and_fro_is_straight() {
+        // Two arcs that turn by 0.2 to and fro: their middle line is off the chord by much less than half the width.
+        let belt = belt(vec![arc(0.2, 1.0), arc(0.4, -1.0), arc(0.2, 1.0)]);
+        let found = between([0.0, 0.0], [0.8, 0.0], &belt);
+        let straight = 4.0 * 0.2f64.sin();
+        assert!((found - straight).abs() < 1e-9, "{found} {straight}");
+    }
+
+    #[test]
+    fn test_way_by_a_corner_beside_an_arc_is_on_the_board() {
+        let turn = SegmentSpec::Corner { angle: 0.3 };
+        let belt = belt(vec![SegmentSpec::straight(0.5), turn, arc(0.5, 1.0)]);
+        let found = between([0.0, 0.0], [1.0, 0.0], &belt);
+        // By way of the spine's corner.
+        let by_corner = 0.5 + 2.0 * 0.25f64.sin();
+        assert!((found - by_corner).abs() < 1e-9, "{found} {by_corner}");
     }
 
     #[test]
