@@ -1,15 +1,16 @@
 //! The side to which a belt bulges, and the search on the other side, which begins at its mirror images.
 
+use super::active_set::settle;
 use super::intrinsic::solve;
 use super::refinement::widened;
 use super::search::{Search, fields_at, prolong};
-use super::{Equilibrium, Solved, Start, is_slender_on_graded_mesh, minimum_from};
+use super::{Equilibrium, Solved, Start, is_slender_on_graded_mesh};
 use crate::geometry::Pose;
 use crate::problem::program::{BeltPoint, BeltProgram, NodeSupport, Piece};
 use crate::problem::{Mesh, Problem};
 use crate::scenario::SAME_PLACE;
 use nalgebra::{Matrix3, Vector2, Vector3};
-use stagewise::Distance;
+use stagewise::{Distance, Program};
 use std::ops::ControlFlow;
 
 /// Mean distance from the chords along the bulge up to which a belt lies on neither side, in U.
@@ -113,13 +114,19 @@ pub(super) fn on_side_of_bulge(
     let [symmetric, others]: [Vec<_>; 2] =
         [true, false].map(|is_twin| images.iter().filter(|i| i.is_twin == is_twin).collect());
     let mut iterations = found.iterations;
-    let mut is_on_side = |mut other: Equilibrium| {
-        iterations += other.iterations;
-        other.iterations = iterations;
-        (other.is_minimum() && other.side() > 0).then_some(other)
+    let mut is_on_side = |other: Result<Equilibrium, usize>| {
+        iterations += match &other {
+            Ok(other) => other.iterations,
+            Err(in_vain) => *in_vain,
+        };
+        let other = other.ok()?;
+        (other.is_minimum() && other.side() > 0).then_some(Equilibrium {
+            iterations,
+            ..other
+        })
     };
     for image in symmetric {
-        if let Some(other) = is_on_side(image.twin(&found, solved, proceed)) {
+        if let Some(other) = is_on_side(Ok(image.twin(&found, solved, proceed))) {
             return other;
         }
     }
@@ -175,13 +182,37 @@ fn solved_minimum(found: &Equilibrium) -> Option<(&Solved, bool)> {
     Some((solved, is_open && held_nodes(&solved.program).len() > 1))
 }
 
-/// The minimum next to the shape into which a load per unit length pushes a minimum along the bulge.
+/// The minimum that a search from a shape of a programme finds; the count of iterations if a first one, on the programme's own
+/// mesh with a first barrier, ends in a minimum on another side: finer meshes would only lead there, too.
+fn minimum_on_side(
+    problem: &Problem,
+    (program, shape): (&BeltProgram, &BeltPoint),
+    barrier: f64,
+    start: Start,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Result<Equilibrium, usize> {
+    let (search, mut program) = (Search::of(problem), program.clone());
+    let near = search.only_from(&program, shape.clone(), barrier, proceed);
+    let (near, misfit) = settle(problem, &search, &mut program, near, proceed);
+    let poses = &near.at.point.poses;
+    let distance = mean_distance(&program.nodes(), poses, &held_nodes(&program));
+    let is_elsewhere = side(distance.dot(&problem.bulge().normalize())) <= 0;
+    if is_elsewhere && near.is_minimum() && misfit.is_none() {
+        return Err(near.iterations);
+    }
+    let mut found = solve(problem, start, proceed);
+    found.iterations += near.iterations;
+    Ok(found)
+}
+
+/// The minimum next to the shape into which a load per unit length pushes a minimum along the bulge, as
+/// [`minimum_on_side`] gives it.
 fn pushed_over(
     problem: &Problem,
     solved: &Solved,
     push: f64,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
-) -> Equilibrium {
+) -> Result<Equilibrium, usize> {
     let search = Search::of(problem);
     let is_widened = is_slender_on_graded_mesh(problem);
     let (known, point) = (&solved.program, &solved.at.point);
@@ -196,14 +227,21 @@ fn pushed_over(
         point.clone()
     };
     let [_, across] = along_and_across(&program, &point, &problem.bulge());
+    let weight = program.weight;
     program.weight += push * across;
     let pushed = search.only_from(&program, point, search.settings.warm_barrier, proceed);
-    let mesh = Mesh::of(problem, &program);
+    program.weight = weight;
+    let (mesh, pushed_to) = (Mesh::of(problem, &program), &pushed.at.point);
     let start = match is_widened {
-        true => Start::Widened(&program, &pushed.at.point),
-        false => Start::Minimum(&mesh, &pushed.at.point),
+        true => Start::Widened(&program, pushed_to),
+        false => Start::Minimum(&mesh, pushed_to),
     };
-    solve(problem, start, proceed)
+    let barrier = search
+        .settings
+        .beside(program.size(pushed_to))
+        .close_barrier;
+    let found = minimum_on_side(problem, (&program, pushed_to), barrier, start, proceed);
+    found.map_err(|in_vain| in_vain + pushed.iterations)
 }
 
 /// A mirror that takes a belt to a belt: the frames, as columns, from R to Q R S. Q is the mirror of space, S the mirror of
@@ -444,20 +482,22 @@ impl Image {
         refined.filter(right).unwrap_or(twin)
     }
 
-    /// The minimum that a search from the image finds.
+    /// The minimum that a search from the image finds, as [`minimum_on_side`] gives it.
     fn search(
         &self,
         problem: &Problem,
         solved: &Solved,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
-    ) -> Equilibrium {
+    ) -> Result<Equilibrium, usize> {
         if is_slender_on_graded_mesh(problem) {
             let start = Start::Widened(&solved.program, &self.shape);
-            return solve(problem, start, proceed);
+            return Ok(solve(problem, start, proceed));
         }
         let program = problem.program(problem.elements());
         let shape = prolong(&solved.program, &self.shape, &program);
-        minimum_from(problem, &shape, proceed)
+        let barrier = Search::of(problem).settings.cold_barrier;
+        let start = Start::Shape(&shape);
+        minimum_on_side(problem, (&program, &shape), barrier, start, proceed)
     }
 }
 
