@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import fishbone as fb
-from helpers import Energy, Json, belt, clamped, example1, example2, solve, support
+from helpers import Energy, Json, arc, belt, board, clamped, example1, example2, solve, straight, support
 
 CLAMPED_CLAMPED = (4.730040744862704, 7.853204624095838, 10.995607838001671)
 """Roots of cos k cosh k = 1."""
@@ -303,3 +303,49 @@ def test_nearest_margin_is_below_that_along_many_directions():
         for direction in rng.normal(size=(10, 6)):
             found = equilibrium.snap_margin(direction=direction, reach=nearest.distance)
             assert found is None or found.distance > 0.95 * nearest.distance
+
+
+# ------------------------------------------------------------- slopes of ribs that hardly any bend holds are no modes
+
+CLAMP = support("start", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("energy", ["fishbone", "sadowsky", "wunderlich"])
+@pytest.mark.parametrize("weight", [1e-4, 1e-2, 1.0])
+def test_flat_arc_under_a_small_load_in_its_plane_is_stable(energy: Energy, weight: float) -> None:
+    """Straight cantilevers on edge buckle at 21.5; these loads are far below."""
+    for curvature, width in [(0.3, 0.02), (1.5, 0.15), (2.9, 0.15), (4.0, 0.25)]:
+        for direction in ([0.0, 0.0, 1.0], [0.0, -1.0, 1.0], [0.0, 0.0, -1.0]):
+            segments = [arc(1.0, curvature)]
+            gravity = weight * np.array(direction)
+            found = solve(board(segments, [CLAMP], energy=energy, width=width, density=1.0, gravity=gravity))
+            assert found.stable is True
+            assert np.max(np.abs(found.bend)) == 0.0
+
+
+@pytest.mark.parametrize("elements", [None, 100, 400])
+def test_overhang_that_bears_nothing_leaves_an_arch_stable(elements: int | None) -> None:
+    arch = support(0.5, (0.0, 0.35, 0.0), (0.0, 0.0, 0.0))
+    found = solve(board([straight(0.5), arc(0.5, 2.0)], [CLAMP, arch], elements=elements))
+    alone = solve(board([straight(0.5)], [CLAMP, arch | {"at": "end"}], elements=elements))
+    assert found.energy == pytest.approx(alone.energy, rel=1e-5)
+    assert found.stable is alone.stable is True
+
+
+@pytest.mark.parametrize("height", [0.0, 0.05])
+def test_taut_span_does_not_make_a_belt_unstable(height: float) -> None:
+    """Its bend is what rounding of its length leaves; the slack span bends as it does alone."""
+    middle = support(0.5, (0.0, 0.5, 0.0), (0.0, 0.0, 0.0))
+    end = support("end", (0.0, 0.8, height), (0.0, 0.0, 0.0))
+    found = solve(belt([CLAMP, middle, end]))
+    assert found.stable is not False
+
+
+@pytest.mark.parametrize("elements", [160, 320, 1000, 2000])
+def test_bent_cantilever_is_stable_on_every_mesh(elements: int) -> None:
+    """Towards its free end the bend tends to 0, and the slopes of the ribs there cost less and less."""
+    weight = np.array([-1.0, 0.0, 0.0])
+    found = solve(board([arc(1.0, 1.5)], [CLAMP], density=1.0, gravity=weight, elements=elements))
+    assert found.stable is True
+    (mode,) = found.modes(1)
+    assert mode.eigenvalue == pytest.approx(15.55, rel=1e-2)

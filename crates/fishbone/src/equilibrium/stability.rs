@@ -3,7 +3,7 @@
 use super::{Equilibrium, flat};
 use crate::problem::Problem;
 use crate::problem::program::{BeltPoint, BeltProgram, ROWS};
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 use stagewise::{Inertia, Outcome, Solution, Stationary, assess};
 
 /// The inertia of the second variation of the energy at an equilibrium, on the shapes that its supports and its active rib
@@ -38,20 +38,21 @@ impl Equilibrium {
     }
 }
 
-/// A solution with square ribs in place of its own where the belt is flat all along: the slope of these ribs costs nothing,
-/// and bends across slanted ribs are stiffer than across square ones.
+/// A solution without any bend and with square ribs in place of its own where the belt is flat all along but for rounding: the
+/// slope of these ribs costs nothing, so that their bounds bear no force, and bends across slanted ribs are stiffer than across
+/// square ones.
 pub(super) fn with_square_ribs(
     problem: &Problem,
     program: &BeltProgram,
     solution: Solution<BeltPoint>,
 ) -> Solution<BeltPoint> {
     let mut at = solution.at.clone();
-    if !at.point.is_flat() || solution.outcome != Outcome::Converged {
+    let is_flat = at.point.is_flat() && !program.is_curled();
+    if !is_flat || solution.outcome != Outcome::Converged {
         return solution;
     }
-    for fields in &mut at.point.fields {
-        fields[1] = 0.0;
-    }
+    at.point.fields.fill(Vector2::zeros());
+    at.multipliers.inequalities.fill(0.0);
     program.settle(&mut at.point);
     if program.least_slack(&at.point) <= 0.0 {
         return solution;
@@ -86,6 +87,8 @@ pub(super) fn decide(
     let is_open = inertia.cost_free > 0 && is_stressed && inertia.negative == 0;
     match is_open {
         true => flat::decide(program, problem.tolerance(), &solution.at),
+        // The bend of a belt at its inextensible limit is what rounding of its length leaves, and so are its modes.
+        false if inertia.negative > 0 && problem.has_no_slack() => None,
         // Negative modes of a shape without energy are those of rounding: no motion lowers it.
         false if program.is_at_rest(&solution.at.point) => Some(Stability {
             negative_modes: 0,

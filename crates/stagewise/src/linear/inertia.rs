@@ -34,6 +34,9 @@ pub struct Inertia {
 impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
     /// Inertia of the second variation; `None` where it depends on inequalities that are neither clearly active nor clearly
     /// inactive. Overwrites the derivatives.
+    ///
+    /// Clearly inactive inequalities count with the stiffness of the last barrier. It is far below the second derivatives of
+    /// the objective, but for controls that hardly change it: these are where the barrier has its minimum, not the objective.
     pub(crate) fn inertia(
         &mut self,
         values: &Values,
@@ -45,8 +48,9 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         let cost_free = self.linear.hold_cost_free_controls();
         let symmetries = zero_modes(metric, symmetries);
         let zero = ZERO * scales.eigenvalue();
-        let clear = |slack: f64, multiplier: f64| multiplier > CLEAR * slack;
-        let doubtful = |slack: f64, multiplier: f64| CLEAR * multiplier > slack;
+        let clear =
+            |slack: f64, multiplier: f64| multiplier > CLEAR * slack || CLEAR * multiplier <= slack;
+        let doubtful = |_: f64, _: f64| true;
         let mut below = |shift: f64, active: fn(f64, f64) -> bool| {
             self.assemble_where(values, multipliers, active);
             self.shift(metric, shift);
