@@ -16,6 +16,7 @@ import fishbone as fb
 import planar
 from conftest import ROOT
 from folds import FOLDS, Expected
+from folds import turned as turned_arch
 from helpers import spine_at
 
 ANGLE = "supports[1].rotation[2]"
@@ -394,6 +395,72 @@ def test_the_same_twice_is_the_same_bit_for_bit(buckling):
 
 def snapped_energy(event: fb.Event) -> float | None:
     return None if event.snapped is None else event.snapped.energy
+
+
+# ------------------------------------------------------------------------------------------------ closed branches
+
+AWAY = (-0.15, 0.25, -1.3)
+"""Where the end of the arch turned by 1.5 is led to, as x, y and its angle; then back."""
+
+
+def there_and_back(step: float = 0.05) -> fb.Diagram:
+    """Led away, the arch folds and goes over to a shape that does not exist at either end of the path."""
+    tables = arch(0.55, 1.5).to_dict()
+    # So large a jump is passed over too.
+    tables["solver"] |= {"elements": 32, "snap_size": 10.0}
+    x, y, angle = AWAY
+    poses = fb.Poses([([x, y, 0.0], [0.0, 0.0, angle]), ([0.0, 0.55, 0.0], [0.0, 0.0, 1.5])])
+    return fb.follow(fb.Scenario.from_dict(tables), poses, states=400, step=step)
+
+
+@pytest.fixture(scope="module")
+def closed() -> fb.Branch:
+    return next(branch for branch in there_and_back().branches if branch.end == "closed")
+
+
+def test_a_branch_that_comes_back_to_its_start_is_closed_there(closed):
+    assert closed.origin == fb.Origin(0, 0)
+    assert closed.parameter[-1] == closed.parameter[0]
+    assert closed.energy[-1] == closed.energy[0]
+    np.testing.assert_array_equal(closed.position[-1], closed.position[0])
+    assert set(closed.status) == {"converged"}
+
+
+def test_a_closed_branch_goes_round_once(closed):
+    """It is a stable shape and a saddle, which fold into each other on the way there and on the way back."""
+    assert len(closed) < 200
+    assert [(event.kind, event.negative_modes, event.confirmed) for event in closed.events] == [
+        ("fold", (0, 1), True),
+        ("fold", (1, 0), True),
+    ]
+    turning = np.sign(np.diff(closed.parameter))
+    assert np.count_nonzero(np.diff(turning)) == len(closed.events)
+    assert np.count_nonzero(np.diff(np.sign(closed.parameter - 1.0))) == 2
+    # No other state but the neighbours of the first is near to it.
+    off = np.linalg.norm(closed.position - closed.position[0], axis=-1).max(axis=-1)
+    off = np.hypot(off, closed.parameter - closed.parameter[0])
+    assert np.all(off[5:-5] > 2.0 * off[[1, -2]].max())
+
+
+def test_a_closed_branch_folds_where_the_planar_reference_has_it(closed):
+    """The path goes back as it came, so that its folds lie alike on both legs. The reference is the mirror image."""
+    x, y, angle = AWAY
+    moved = planar.at_parameter(turned_arch(0.55, 1, -angle), np.array([-x, y - 0.55, 0.0]), 1.0)
+    expected = next(planar.folds(moved, np.array([x, 0.55 - y, angle - 1.5])))
+    place = 1.0 - (expected.pose[2] - moved.pose[2]) / (angle - 1.5)
+    back, there = closed.events
+    assert there.parameter == pytest.approx(place, abs=1e-4)
+    assert back.parameter == pytest.approx(2.0 - place, abs=1e-4)
+    for fold in (back, there):
+        assert closed.energy[fold.state] == pytest.approx(expected.state.energy, rel=1e-4)
+
+
+@pytest.mark.parametrize("step", [0.02, 0.15])
+def test_a_branch_is_closed_at_the_same_place_for_steps_of_any_length(step, closed):
+    [branch] = [branch for branch in there_and_back(step).branches if branch.end == "closed"]
+    assert branch.parameter[0] == pytest.approx(closed.parameter[0], abs=1e-7)
+    places = [event.parameter for event in closed.events]
+    np.testing.assert_allclose([event.parameter for event in branch.events], places, atol=1e-7)
 
 
 # ----------------------------------------------------------------------------------------------------- exports
