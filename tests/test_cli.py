@@ -523,6 +523,17 @@ def test_follow_says_how_many_events_it_leaves_out(turned):
         assert "2 of 3 events are left out" in report.shortfall(turned)
 
 
+def test_a_branch_that_is_led_no_further_says_what_is_known_of_its_end(monkeypatch, turned):
+    [branch] = turned.branches
+    [fold] = branch.events
+    monkeypatch.setattr(branch, "end", "unstable")
+    assert report.shortfall(turned).endswith("ends where the belt snaps (raise --branches)")
+    monkeypatch.setattr(branch, "events", [fold._replace(confirmed=False)])
+    assert "ends where the belt snaps, which a finer mesh does not confirm" in report.shortfall(turned)
+    monkeypatch.setattr(branch, "events", [fold._replace(snapped=None, snapped_parameter=None)])
+    assert report.shortfall(turned).endswith("loses its stability, and no minimum is found beyond")
+
+
 @pytest.mark.parametrize(
     "path",
     [

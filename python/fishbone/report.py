@@ -65,9 +65,7 @@ def report_diagram(diagram: Diagram) -> Group:
     name = diagram.scenario.to_dict().get("name") or "belt"
     title = Text(f"{name}: equilibria along a path, parameter: {diagram.parameter_name}", style="bold")
     ends = [
-        Text(f"branch {index} {ENDS[branch.end]}")
-        for index, branch in enumerate(diagram.branches)
-        if branch.end in ENDS
+        Text(f"branch {index} {_ending(branch)}") for index, branch in enumerate(diagram.branches) if branch.end in ENDS
     ]
     ends += [Text(f"branch {index} turns back: {back}") for index, back in _turned_back(diagram)]
     events = [event for branch in diagram.branches for event in branch.events]
@@ -93,13 +91,24 @@ def shortfall(diagram: Diagram) -> str:
     # A belt that is led along its minima goes from branch to branch, else the others leave the first.
     index = len(diagram.branches) - 1 if diagram.branches[0].end == "unstable" else 0
     branch = diagram.branches[index]
-    remedy = {"budget": " (raise --states)", "unstable": " (raise --branches)"}.get(branch.end, "")
+    snaps = bool(branch.events) and branch.events[-1].snapped is not None
+    remedy = {"budget": " (raise --states)", "unstable": " (raise --branches)" if snaps else ""}.get(branch.end, "")
     events = [event for branch in diagram.branches for event in branch.events]
     left_out = "" if all(event.confirmed for event in events) else f"; {_left_out(events)}"
     return (
         f"the path ({diagram.parameter_name}) is followed to {number(diagram.reached)} of {number(diagram.goal)}: "
-        f"branch {index} {ENDS[branch.end]}{remedy}{left_out}"
+        f"branch {index} {_ending(branch)}{remedy}{left_out}"
     )
+
+
+def _ending(branch: Branch) -> str:
+    """The printed reason of the end of a branch: of a loss of stability, what is known of it."""
+    if branch.end != "unstable" or not branch.events:
+        return ENDS[branch.end]
+    last = branch.events[-1]
+    lost = "ends where the belt loses its stability, and no minimum is found beyond"
+    known = "" if last.confirmed else ", which a finer mesh does not confirm"
+    return (lost if last.snapped is None else ENDS[branch.end]) + known
 
 
 def below_limit(diagram: Diagram, limit: float) -> str:
