@@ -112,8 +112,11 @@ def test_accuracy_is_bought_with_elements() -> None:
 
 
 def test_coarse_fixed_mesh_is_warned_of() -> None:
-    [warning] = solve(CASES["example 2"](), elements=80).warnings
-    assert "force" in warning
+    found = solve(CASES["example 2"](), elements=80)
+    [warning] = found.warnings
+    assert found.error is not None
+    name, largest = max(found.error._asdict().items(), key=lambda error: error[1])
+    assert f"the estimated error of the {name}, {largest:.1e}".replace("e-0", "e-") in warning
     assert "solver.accuracy, 0.001" in warning
 
 
@@ -277,3 +280,67 @@ def test_a_tolerance_below_rounding_is_named() -> None:
     assert found.status == "not_converged"
     assert found.message.startswith("solver.tolerance, 1.0e-13, is below what rounding leaves")
     assert found.energy == pytest.approx(pulled(1e-8).energy, rel=1e-8)
+
+
+ONE_STEP: dict[str, dict[str, Any]] = {
+    "a hinged circuit": {
+        "belt": {
+            "width": 0.1978,
+            "rigidity": 1.0,
+            "segments": [
+                {"kind": "straight", "length": 0.30718},
+                {"kind": "arc", "length": 0.3538, "curvature": -2.786},
+                {"kind": "straight", "length": 0.33902},
+            ],
+            "density": 1.0,
+        },
+        "energy": "wunderlich",
+        "supports": [
+            {"at": "start", "position": [0, 0, 0]},
+            {
+                "at": "end",
+                "position": [0.10567, 0.66839, -0.12923],
+                "rotation": [1.6009, 0.64157, -0.94565],
+                "hinge": "zeta",
+                "moment": 1.5842,
+            },
+        ],
+        "loads": {"gravity": [0.024561, -0.2184, -0.094833]},
+    },
+    "a strip with a corner that hangs": {
+        "belt": {
+            "width": 0.014512,
+            "rigidity": 1.0,
+            "segments": [
+                {"kind": "straight", "length": 0.31003},
+                {"kind": "corner", "angle": -0.67647},
+                {"kind": "straight", "length": 0.68997},
+            ],
+            "density": 1.0,
+        },
+        "energy": "wunderlich",
+        "supports": [
+            {"at": "start", "position": [0, 0, 0], "rotation": [0.85464, -0.36005, -0.87627]},
+            {"at": "end", "position": [0.05883, 0.6368, 0.068]},
+        ],
+        "loads": {"gravity": [1189.7, -1138.4, -3080.3]},
+    },
+}
+"""Belts of which one Newton step on the finer mesh misses the change of the forces, or of the tightest bend, by far."""
+
+
+@pytest.mark.parametrize("name", ONE_STEP)
+def test_estimate_holds_where_one_newton_step_does_not(name: str) -> None:
+    found = fb.solve(fb.Scenario.from_dict(ONE_STEP[name]), strict=True)
+    fine = found.refined(1600)
+    assert found.error is not None
+    assert fine is not None
+
+    def forces(of: fb.Equilibrium) -> list[Any]:
+        return [np.array(held["force"]) for held in of.to_dict()["supports"]]
+
+    moves = [float(np.linalg.norm(own - true)) for own, true in zip(forces(found), forces(fine), strict=True)]
+    force = max(moves) / max(float(np.linalg.norm(true)) for true in forces(fine))
+    radii = [of.to_dict()["least_spine_radius"]["value"] for of in (found, fine)]
+    assert force <= found.error.force / 0.3
+    assert abs(radii[0] / radii[1] - 1.0) <= found.error.radius / 0.3

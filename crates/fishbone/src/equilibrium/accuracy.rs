@@ -1,4 +1,4 @@
-//! The error that the mesh makes, estimated by one Newton step on the mesh of elements half as long.
+//! The error that the mesh makes, estimated by the equilibrium of the mesh of elements half as long.
 
 use super::refinement::{PER_WIDTH, ribs_turn};
 use super::search::{Search, prolonged, prolonged_with_multipliers};
@@ -79,13 +79,14 @@ pub(super) struct Estimate {
 }
 
 impl Estimate {
-    /// Change from which one Newton step tells no more than that the error is large, relative.
-    pub(super) const WILD: f64 = 0.02;
+    /// Error from which one Newton step tells no more than that the error is large, relative.
+    const WILD: f64 = 0.02;
     /// Error over its change on halving all elements, dimensionless.
     const OVER_CHANGE: f64 = 1.2;
 
-    /// The estimate for a solution of a problem's programme; `None` where the finer mesh has no solution next to it. Where one
-    /// Newton step changes a quantity by more than `most`, relative, the equilibrium of the finer mesh is searched instead.
+    /// The estimate for a solution of a problem's programme; `None` where the finer mesh has no solution next to it. One Newton
+    /// step tells whether the mesh has to be finer. Where it need not, and for an estimate that is the last, Newton's method
+    /// goes on to the equilibrium of the finer mesh: if that fails, the step has to do, unless it is wild.
     ///
     /// The error of a quantity that converges with the square of the length of elements is 4/3 of its change on halving
     /// them, and nearer to the change itself of one that converges faster.
@@ -94,7 +95,7 @@ impl Estimate {
         program: &BeltProgram,
         at: &Stationary<BeltPoint>,
         values: &Values,
-        most: f64,
+        is_last: bool,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Option<Self> {
         let mesh = Mesh::of(problem, program);
@@ -121,8 +122,9 @@ impl Estimate {
         // A density that does not know the width lets ribs turn over anywhere at no cost, and elements much longer than the
         // width hold ribs wherever they turn: one step does not move the place from element to element.
         let is_accurate = error.largest() <= problem.accuracy();
+        let is_wild = is_last && error.largest() > Self::WILD;
         let may_turn_elsewhere = match turns_coarsely(program, &at.point) {
-            true => is_accurate || most.is_finite(),
+            true => is_accurate || is_last,
             false => is_accurate && !program.model.knows_width(),
         };
         if may_turn_elsewhere {
@@ -134,8 +136,12 @@ impl Estimate {
                 let best = (point, multipliers.equalities, solution.values.objective);
                 error = own.off_on(problem, &finest, &best);
             }
-        } else if ribs_meet || error.largest() > most {
-            let solution = solved_near(problem, &fine, &near, proceed);
+        } else if ribs_meet || is_accurate || is_last {
+            let found = stagewise::settle(&fine, tolerance(problem), near.clone());
+            let solution = match ribs_meet || is_wild {
+                true => found.or_else(|| searched_near(problem, &fine, &near.point, proceed)),
+                false => found,
+            };
             if let Some(solution) = solution.filter(|found| is_next_to(found, &here)) {
                 let Stationary { point, multipliers } = solution.at;
                 better = (point, multipliers.equalities, solution.values.objective);
@@ -204,17 +210,6 @@ fn tolerance(problem: &Problem) -> f64 {
     /// Residual that hardly changes an estimate, lengths in U and energy in mean R_f/U.
     const CLOSE: f64 = 1e-8;
     problem.tolerance().max(CLOSE)
-}
-
-/// The equilibrium of a programme near to a point: by Newton's method, else the minimum that a search from there finds.
-fn solved_near(
-    problem: &Problem,
-    program: &BeltProgram,
-    near: &Stationary<BeltPoint>,
-    proceed: &mut dyn FnMut() -> ControlFlow<()>,
-) -> Option<Solution<BeltPoint>> {
-    stagewise::settle(program, tolerance(problem), near.clone())
-        .or_else(|| searched_near(problem, program, &near.point, proceed))
 }
 
 /// The minimum of a programme that a search from a point finds.

@@ -1,6 +1,6 @@
 //! The intrinsic method: the interior-point search in the two fields bend and rib slope.
 
-use super::accuracy::{Estimate, MeshError};
+use super::accuracy::MeshError;
 use super::active_set::settle;
 use super::refinement::{Begin, Level, ROUNDING, refine};
 use super::search::{MinimumSettings, Search, is_flat_under_load, prolong};
@@ -230,7 +230,7 @@ fn find(
     let (solution, fault) = settle(problem, &search, &mut program, solution, proceed);
     let mut level = Level::new(program, solution, fault);
     if level.turns_too_far() {
-        level.estimate(problem, Estimate::WILD, proceed);
+        level.estimate(problem, true, proceed);
     }
     Found::of(problem, level)
 }

@@ -163,7 +163,7 @@ impl Equilibrium {
         highest_point(&self.spine, &self.problem.bulge())
     }
 
-    /// The estimated error by the mesh, found by one Newton step on the mesh of elements half as long; `None` of a solve that
+    /// The estimated error by the mesh, found by the equilibrium of the mesh of elements half as long; `None` of a solve that
     /// has not converged by a method with multipliers, and where that mesh has no equilibrium next to this one.
     pub fn error(&self) -> Option<MeshError> {
         *self.error.get_or_init(|| {
@@ -173,7 +173,7 @@ impl Equilibrium {
                 &solved.program,
                 &solved.at,
                 &solved.values,
-                Estimate::WILD,
+                true,
                 &mut || ControlFlow::Continue(()),
             );
             Some(estimate?.error)

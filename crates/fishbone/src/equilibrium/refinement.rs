@@ -104,7 +104,7 @@ pub(super) fn refine(
             }
         };
         // A long step tells where the mesh has to be finer, and no more is asked here.
-        level.estimate(problem, f64::INFINITY, proceed);
+        level.estimate(problem, false, proceed);
         iterations += level.solution.iterations;
         level.solution.iterations = iterations;
         let is_done =
@@ -135,7 +135,7 @@ pub(super) fn refine(
     if !best.is_precise(search.tolerance) {
         best = best.again(problem, search, proceed);
     }
-    best.estimate(problem, Estimate::WILD, proceed);
+    best.estimate(problem, true, proceed);
     best
 }
 
@@ -333,17 +333,17 @@ impl Level {
         }
     }
 
-    /// Estimates the error of a solution that has converged. Where one Newton step changes a quantity by more than `most`,
-    /// relative, the equilibrium of a finer mesh is searched for it.
+    /// Estimates the error of a solution that has converged: by a Newton step on a finer mesh, or where that is small, and for
+    /// the last estimate, by the equilibrium of that mesh.
     pub(super) fn estimate(
         &mut self,
         problem: &Problem,
-        most: f64,
+        is_last: bool,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) {
         if self.has_converged() {
             let (at, values) = (&self.solution.at, &self.solution.values);
-            self.estimate = Estimate::new(problem, &self.program, at, values, most, proceed);
+            self.estimate = Estimate::new(problem, &self.program, at, values, is_last, proceed);
         }
     }
 
