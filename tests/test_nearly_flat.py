@@ -105,6 +105,16 @@ def test_arc_held_in_its_plane_has_the_energy_and_force_of_a_larger_lift_in_prop
         assert near.reaction("end").force[0] == pytest.approx(2.0 * near.energy / lift, rel=2e-3)
 
 
+def test_energy_of_a_wide_arc_is_the_square_of_its_lift() -> None:
+    """Such an arc is found off its plane by a tenth, and brought back."""
+    energies = []
+    for lift in (1e-5, 1e-3, 5e-3):
+        lifted = fb.solve(_arc({"position": [lift, *END[1:]]}, width=0.1), strict=True)
+        assert lifted.stable
+        energies.append(lifted.energy / lift**2)
+    assert energies == pytest.approx([energies[0]] * 3, rel=1e-3)
+
+
 @pytest.mark.parametrize("slack", [1e-6, 1e-8])
 def test_strip_with_hardly_any_slack_has_eulers_energy_and_force(slack: float) -> None:
     strip = fb.solve(fb.Scenario.from_dict(clamped((0.0, 1.0 - slack, 0.0))))

@@ -29,7 +29,7 @@ pub(super) fn brought_back(
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Option<Equilibrium> {
     /// Lifts from which it is brought back, tried in turn, in U and rad.
-    const LIFTS: [f64; 2] = [LIFT, 3.0 * LIFT];
+    const LIFTS: [f64; 3] = [LIFT, 3.0 * LIFT, 10.0 * LIFT];
     /// Factor by which the lift falls from search to search, and the least such factor that is tried, dimensionless.
     const STEPS: [f64; 2] = [10.0, 1.5];
     /// Lift down to which a minimum is searched, and the greatest from which shapes are in proportion, in U and rad.

@@ -39,8 +39,8 @@ impl Equilibrium {
 }
 
 /// A solution without any bend and with square ribs in place of its own where the belt is flat all along but for rounding: the
-/// slope of these ribs costs nothing, so that their bounds bear no force, and bends across slanted ribs are stiffer than across
-/// square ones.
+/// slope of these ribs costs nothing, and bends across slanted ribs are stiffer than across square ones. Their bounds bear no
+/// force, and count with none, but keep the multipliers of the last barrier, from which a search may begin.
 pub(super) fn with_square_ribs(
     problem: &Problem,
     program: &BeltProgram,
@@ -57,11 +57,13 @@ pub(super) fn with_square_ribs(
     if program.least_slack(&at.point) <= 0.0 {
         return solution;
     }
-    let square = assess(program, problem.tolerance(), &at).after(solution.iterations);
-    match square.outcome {
-        Outcome::Converged => square,
-        _ => solution,
+    let mut square = assess(program, problem.tolerance(), &at).after(solution.iterations);
+    if square.outcome != Outcome::Converged {
+        return solution;
     }
+    square.at.multipliers.inequalities = solution.at.multipliers.inequalities;
+    square.residuals.complementarity = solution.residuals.complementarity;
+    square
 }
 
 /// Stability of a solution by its second variation, on all motions that its scenario leaves; `None` where it is undecided.
