@@ -319,6 +319,68 @@ def test_a_support_is_led_through_pose_after_pose():
     assert diagram.support == 1
 
 
+@pytest.mark.parametrize("snaps", [True, False])
+def test_an_arch_is_led_there_and_back(snaps):
+    """At the pose between, the way turns back at once. The arch leans over on the way there, and stands up again."""
+    poses = [([0.0, 0.3, 0.0], [0.0, 1.5, 0.0]), ([0.0, 0.6, 0.0], [0.0, 0.0, 0.0])]
+    diagram = fb.follow(arch(), fb.Poses(poses), snaps=snaps)
+    trunk = diagram.branches[0]
+    assert (diagram.is_complete, trunk.end, trunk.parameter[-1]) == (True, "range", 2.0)
+    assert trunk.energy[-1] == pytest.approx(trunk.energy[0], rel=1e-8)
+    assert trunk.stable[-1] is True
+    there, back = (event.parameter for event in trunk.events)
+    assert there == pytest.approx(2.0 - back, abs=1e-5)
+    # The pose between is a state, once, and no event.
+    assert np.count_nonzero(trunk.parameter == 1.0) == 1
+    np.testing.assert_allclose(trunk.position[trunk.parameter == 1.0][0, -1], poses[0][0], atol=1e-7)
+
+
+def random_way(seed: int) -> tuple[fb.Scenario, list[tuple[np.ndarray, np.ndarray]]]:
+    """A strip of few elements, and three poses of its end: back to the first one for every other seed."""
+    rng = np.random.default_rng(seed)
+
+    def pose(reach: float, turn: float) -> np.ndarray:
+        return np.concatenate((rng.uniform(-reach, reach, 3), rng.uniform(-turn, turn, 3)))
+
+    first = pose(0.2, 0.8) + 0.5 * np.eye(6)[1]
+    between, last = (first + pose(0.25, 1.6) for _ in range(2))
+    poses = [first, between, first if seed % 2 else last]
+    tables = arch().to_dict()
+    tables |= {"energy": "wunderlich", "solver": {"elements": 40}}
+    tables["supports"][1] |= {"position": first[:3].tolist(), "rotation": first[3:].tolist()}
+    return fb.Scenario.from_dict(tables), [(pose[:3], pose[3:]) for pose in poses]
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_strips_are_led_past_the_pose_between_two_legs(seed):
+    scenario, poses = random_way(seed)
+    diagram = fb.follow(scenario, fb.Poses(poses[1:]), snaps=True)
+    last = diagram.branches[-1]
+    assert (last.end, last.parameter[-1]) == ("range", 2.0)
+    np.testing.assert_allclose(last.position[-1, -1], poses[-1][0], atol=1e-7)
+    events = [event for branch in diagram.branches for event in branch.events]
+    assert all(event.parameter != 1.0 for event in events)
+    if seed % 2 and not events:
+        np.testing.assert_allclose(last.position[-1], last.position[0], atol=1e-6)
+
+
+@pytest.mark.parametrize("past", [-1e-3, -1e-6, 1e-6, 1e-3])
+@pytest.mark.parametrize("step", [0.02, 0.3])
+def test_a_fold_next_to_a_pose_is_met_only_before_the_pose(step, past, turned):
+    """A way that turns back just before a fold does not meet it, though the curve of the leg goes on to it."""
+    [fold] = turned.branches[0].events
+    angle = fold.parameter - past
+    poses = [([0.0, 0.6, 0.0], [0.0, 0.0, angle]), ([0.0, 0.6, 0.0], [0.0, 0.0, 0.0])]
+    [branch] = fb.follow(arch(), fb.Poses(poses), branches=1, step=step).branches
+    assert branch.end == "range"
+    if past < 0.0:
+        assert (branch.events, branch.parameter[-1], set(branch.stable)) == ([], 2.0, {True})
+    else:
+        assert branch.events[0].kind == "fold"
+        assert branch.events[0].parameter == pytest.approx(fold.parameter / angle, abs=1e-6)
+        assert branch.parameter[-1] == 0.0
+
+
 def test_a_screw_and_a_line_lead_to_one_end_by_different_ways():
     poses = [([0.0, 0.7, 0.1], [0.0, 0.8, 0.0])]
     line, screw = (
@@ -435,7 +497,9 @@ def test_a_closed_branch_goes_round_once(closed):
     ]
     turning = np.sign(np.diff(closed.parameter))
     assert np.count_nonzero(np.diff(turning)) == len(closed.events)
-    assert np.count_nonzero(np.diff(np.sign(closed.parameter - 1.0))) == 2
+    # It passes the pose between the legs twice, each time with a state.
+    assert np.count_nonzero(closed.parameter == 1.0) == 2
+    assert np.count_nonzero(np.diff(np.sign(closed.parameter[closed.parameter != 1.0] - 1.0))) == 2
     # No other state but the neighbours of the first is near to it.
     off = np.linalg.norm(closed.position - closed.position[0], axis=-1).max(axis=-1)
     off = np.hypot(off, closed.parameter - closed.parameter[0])

@@ -34,10 +34,27 @@ impl Along {
         }
     }
 
+    /// The programmes along the leg of the path on which a station lies, and the places of the ends of this leg; where two
+    /// legs meet, it is the leg ahead.
+    pub(super) fn leg(&self, station: &Station) -> (Self, [f64; 2]) {
+        let (path, ends) = self.path.leg(station.parameter, station.is_rising());
+        let mesh = self.mesh.clone();
+        (Self { path, mesh }, ends)
+    }
+
     /// A continuation over the whole path.
     pub(super) fn continuation(&self, pace: Pace) -> Continuation<'_, Self, 6, 2, 8> {
+        self.continuation_between([0.0, self.path.length()], pace)
+    }
+
+    /// A continuation over a part of the path.
+    pub(super) fn continuation_between(
+        &self,
+        ends: [f64; 2],
+        pace: Pace,
+    ) -> Continuation<'_, Self, 6, 2, 8> {
         let tolerance = self.path.base().tolerance();
-        Continuation::new(self, tolerance, [0.0, self.path.length()], pace)
+        Continuation::new(self, tolerance, ends, pace)
     }
 
     /// The start of the same branch on the mesh of elements half as long, next to a station of this family, with the path on
@@ -175,6 +192,28 @@ mod tests {
         ];
         scenario.solver.elements = Some(48);
         Problem::new(scenario).unwrap()
+    }
+
+    #[test]
+    fn test_a_leg_goes_on_beyond_its_ends_without_an_angle() {
+        let problem = problem();
+        let poses = [
+            (Vector3::new(0.2, 1.1, 0.1), Vector3::new(0.5, -0.2, 1.1)),
+            (Vector3::new(0.4, 1.0, 0.3), Vector3::new(-0.4, 0.6, 0.3)),
+        ];
+        let path = Path::poses(&problem, 1, &poses, Motion::Straight).unwrap();
+        let meets = [0.0, 0.5, 1.0, 1.5, 2.0].map(|place| path.is_between_legs(place));
+        assert_eq!(meets, [false, false, true, false, false]);
+        let end = |path: &Path, place| path.at(place).unwrap().clamp(1).unwrap().position;
+        for (rising, ends) in [(true, [1.0, 2.0]), (false, [0.0, 1.0])] {
+            let (leg, found) = path.leg(1.0, rising);
+            assert_eq!(found, ends);
+            let [before, pose, after] = [0.8, 1.0, 1.2].map(|place| end(&leg, place));
+            assert!((before + after - 2.0 * pose).norm() < 1e-12);
+            assert!((pose - end(&path, 1.0)).norm() < 1e-12);
+            let own = if rising { 1.2 } else { 0.8 };
+            assert!((end(&leg, own) - end(&path, own)).norm() < 1e-12);
+        }
     }
 
     #[test]

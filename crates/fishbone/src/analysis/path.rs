@@ -34,6 +34,12 @@ pub trait Change: Debug + Send + Sync {
     fn parameter(&self, place: f64) -> f64 {
         place
     }
+
+    /// Of a change in legs that meet at whole numbers of the place, perhaps at an angle: the change along one of them, counted
+    /// from 0, which goes on beyond both ends of the leg without an angle.
+    fn on_leg(&self, _leg: usize) -> Option<Arc<dyn Change>> {
+        None
+    }
 }
 
 /// A path: the problem at its start, and the change from place to place.
@@ -46,11 +52,13 @@ pub struct Path {
 }
 
 /// Poses of a support, one after the other; the first is its own.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 struct Poses {
     support: usize,
     poses: Vec<Pose>,
     motion: Motion,
+    /// The leg that goes on beyond its ends; `None` of all legs.
+    leg: Option<usize>,
 }
 
 named! {
@@ -151,6 +159,7 @@ impl Path {
             support,
             poses,
             motion,
+            leg: None,
         };
         Self::new(problem, change)
     }
@@ -193,6 +202,29 @@ impl Path {
         })
     }
 
+    /// The path along the leg on which a place lies, and the places of the ends of this leg, beyond which the path goes on
+    /// without an angle. Where two legs meet, it is the leg ahead. A path without legs is its own leg.
+    pub(super) fn leg(&self, place: f64, rising: bool) -> (Self, [f64; 2]) {
+        let length = self.length();
+        let start = if rising {
+            place.floor()
+        } else {
+            place.ceil() - 1.0
+        };
+        let start = start.clamp(0.0, (length - 1.0).max(0.0));
+        let Some(change) = self.change.on_leg(start as usize) else {
+            return (self.clone(), [0.0, length]);
+        };
+        let base = self.base.clone();
+        (Self { base, change }, [start, start + 1.0])
+    }
+
+    /// Whether two legs of the path meet at a place.
+    pub(super) fn is_between_legs(&self, place: f64) -> bool {
+        let [ahead, behind] = [true, false].map(|rising| self.leg(place, rising).1);
+        ahead != behind
+    }
+
     /// The problem at a place on the path, or a little before or beyond it; `None` where the scenario there is not valid.
     pub fn at(&self, place: f64) -> Option<Problem> {
         self.change.problem(&self.base, place).ok()
@@ -202,7 +234,8 @@ impl Path {
 impl Poses {
     /// The poses between which a place lies, and its share of the way from one to the other.
     fn leg(&self, place: f64) -> (&Pose, &Pose, f64) {
-        let leg = (place.max(0.0) as usize).min(self.poses.len() - 2);
+        let leg = self.leg.unwrap_or(place.max(0.0) as usize);
+        let leg = leg.min(self.poses.len() - 2);
         (&self.poses[leg], &self.poses[leg + 1], place - leg as f64)
     }
 }
@@ -222,6 +255,13 @@ impl Change for Poses {
 
     fn length(&self) -> f64 {
         self.poses.len() as f64 - 1.0
+    }
+
+    fn on_leg(&self, leg: usize) -> Option<Arc<dyn Change>> {
+        Some(Arc::new(Self {
+            leg: Some(leg),
+            ..self.clone()
+        }))
     }
 }
 

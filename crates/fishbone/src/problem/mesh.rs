@@ -6,7 +6,7 @@ use crate::problem::program::{BeltProgram, Piece};
 use crate::strip::bounds::ActiveEdges;
 
 /// A mesh, with the active edges of its pieces.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Mesh {
     /// The elements of every stretch of the belt.
     divisions: Vec<Division>,

@@ -105,6 +105,17 @@ impl<'a, F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
         start: Station<F::Point, N>,
         proceed: &mut dyn FnMut(&Station<F::Point, N>) -> ControlFlow<R>,
     ) -> Curve<F::Point, R, N> {
+        self.trace_on(start, None, proceed)
+    }
+
+    /// As [`Self::trace`]; a curve that goes on from another one is closed where that one began: at a first station of a
+    /// family with the same programmes there.
+    pub fn trace_on<R>(
+        &self,
+        start: Station<F::Point, N>,
+        first: Option<&Station<F::Point, N>>,
+        proceed: &mut dyn FnMut(&Station<F::Point, N>) -> ControlFlow<R>,
+    ) -> Curve<F::Point, R, N> {
         let mut curve = Curve {
             stations: vec![start],
             events: Vec::new(),
@@ -122,10 +133,11 @@ impl<'a, F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
                 curve.end = End::Lost;
                 break;
             };
-            let first = &curve.stations[0];
+            let may_close = first.is_some() || curve.stations.len() > 1;
+            let first = first.unwrap_or(&curve.stations[0]);
             // A curve that begins at an end of the range leaves the range where it would be closed.
             let is_inside = self.range[0] < first.parameter && first.parameter < self.range[1];
-            let closing = match curve.stations.len() > 1 && is_inside {
+            let closing = match may_close && is_inside {
                 true => self.closing(first, last, &step),
                 false => None,
             };
@@ -143,12 +155,12 @@ impl<'a, F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
                 }
             }
             curve.stations.push(step.station);
-            if step.arrived {
-                curve.end = End::Range;
-                break;
-            }
             if closing.is_some() {
                 curve.end = End::Closed;
+                break;
+            }
+            if step.arrived {
+                curve.end = End::Range;
                 break;
             }
         }
@@ -231,18 +243,18 @@ impl<'a, F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
                 continue;
             };
             let event = self.event_on(last, &next, *length);
-            let [low, high] = self.range;
-            if next.parameter < low || next.parameter > high {
-                let inside = event.filter(|event| (low..=high).contains(&event.station.parameter));
-                let from = inside.as_ref().map_or(last, |event| &event.station);
-                let end = next.parameter.clamp(low, high);
-                let station = self.land(from, &next, end)?;
-                return Some(Step {
-                    length: *length,
-                    station,
-                    event: inside,
-                    arrived: true,
-                });
+            let leaves = self.is_outside(&next);
+            let turns_outside = event.as_ref().is_some_and(|e| self.is_outside(&e.station));
+            if leaves || turns_outside {
+                let step = self.step_to_end(last, &next, event, *length);
+                if step.is_some() {
+                    return step;
+                }
+                *length *= 0.5;
+                if *length < self.shortest() {
+                    return None;
+                }
+                continue;
             }
             let taken = *length;
             *length = (LONGER * taken).min(self.pace.longest);
@@ -255,7 +267,45 @@ impl<'a, F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
         }
     }
 
-    /// The station at a parameter between two stations.
+    /// Whether a station lies outside the range.
+    fn is_outside(&self, station: &Station<F::Point, N>) -> bool {
+        let [low, high] = self.range;
+        !(low..=high).contains(&station.parameter)
+    }
+
+    /// The step to where a step of a length, with its event, leaves the range; the curve may turn back outside. `None` where
+    /// no station is found there, or one of another curve.
+    fn step_to_end(
+        &self,
+        last: &Station<F::Point, N>,
+        next: &Station<F::Point, N>,
+        event: Option<Event<F::Point, N>>,
+        length: f64,
+    ) -> Option<Step<F::Point, N>> {
+        let [low, high] = self.range;
+        let is_counted = self.pace.events != Events::Ignore
+            && (event.is_some() || last.turn_before(next).is_none());
+        let (inside, outside) = match event {
+            Some(event) if self.is_outside(&event.station) => (None, Some(event)),
+            event => (event, None),
+        };
+        let from = inside.as_ref().map_or(last, |event| &event.station);
+        let to = outside.as_ref().map_or(next, |event| &event.station);
+        let mut station = self.land(from, to, to.parameter.clamp(low, high))?;
+        if station.parameter == low {
+            station.tangent.turn_round();
+        }
+        let negative = inside.as_ref().map_or(last.negative, |e| e.negative[1]);
+        let is_same = !is_counted || station.negative == negative;
+        is_same.then_some(Step {
+            length,
+            station,
+            event: inside,
+            arrived: true,
+        })
+    }
+
+    /// The station at a parameter between two stations, with its tangent toward larger parameters.
     fn land(
         &self,
         from: &Station<F::Point, N>,
@@ -272,7 +322,7 @@ impl<'a, F: Family<X, U, N>, const X: usize, const U: usize, const N: usize>
         };
         let mut at = nearer.at.clone();
         let arrival = self.correct(&mut at, parameter, None)?;
-        self.station(at, arrival, Some(&to.tangent))
+        self.station(at, arrival, None)
     }
 
     /// Barrier parameter at half of the tolerated complementarity.

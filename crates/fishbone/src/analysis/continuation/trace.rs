@@ -1,8 +1,9 @@
-//! A branch on one mesh: a curve, which goes on with other active edges wherever the ribs come to other edges.
+//! A branch on one mesh: a curve, which goes on over leg after leg of the path, and with other active edges wherever the ribs
+//! come to other edges.
 
 use crate::analysis::family::{Along, Station};
 use crate::problem::program::BeltPoint;
-use stagewise::{Distance, Pace};
+use stagewise::{Curve, Distance, End, Pace};
 use std::ops::ControlFlow;
 
 /// A place where the number of negative modes changes.
@@ -36,8 +37,9 @@ pub(super) fn trace(
     start: Station,
     pace: Pace,
     proceed: &mut dyn FnMut(&Station) -> ControlFlow<()>,
-) -> (Vec<Stretch>, stagewise::End<Stop>) {
+) -> (Vec<Stretch>, End<Stop>) {
     let mut stretches: Vec<Stretch> = Vec::new();
+    let (begun_on, first) = (&family.mesh, start.clone());
     let (mut family, mut start) = (family.clone(), start);
     let mut left = pace.stations;
     loop {
@@ -45,7 +47,9 @@ pub(super) fn trace(
             stations: left,
             ..pace
         };
-        let curve = family.continuation(pace).trace(start, &mut |station| {
+        let is_back = !stretches.is_empty() && family.mesh == *begun_on;
+        let first = is_back.then_some(&first);
+        let curve = curve_over_legs(&family, start, first, pace, &mut |station| {
             if proceed(station).is_break() {
                 return ControlFlow::Break(Stop::Interrupted);
             }
@@ -66,7 +70,7 @@ pub(super) fn trace(
             _ => None,
         };
         let end = match beyond {
-            Some(_) => stagewise::End::Stopped(Stop::Edges),
+            Some(_) => End::Stopped(Stop::Edges),
             None => curve.end,
         };
         if !stations.is_empty() {
@@ -79,6 +83,58 @@ pub(super) fn trace(
         match next {
             Some(next) => (family, start) = next,
             None => return (stretches, end),
+        }
+    }
+}
+
+/// The curve of a family from a station to its end, over leg after leg of the path. The curve of a branch that began at
+/// another station may be closed there.
+///
+/// Where two legs meet at an angle, the curve has a corner, and a step along its tangent misses the leg ahead. So the curve is
+/// followed up to there, and from there along its tangent on the leg ahead, in the same sense of the parameter.
+fn curve_over_legs(
+    family: &Along,
+    start: Station,
+    first: Option<&Station>,
+    pace: Pace,
+    proceed: &mut dyn FnMut(&Station) -> ControlFlow<Stop>,
+) -> Curve<BeltPoint, Stop, 8> {
+    let mut first = first.cloned();
+    let mut whole = Curve {
+        stations: vec![start],
+        events: Vec::new(),
+        end: End::Range,
+    };
+    loop {
+        // The station where two legs meet is the last on one and the first on the other.
+        let last = whole.stations.pop().expect("a curve has its start");
+        let before = whole.stations.len();
+        let pace = Pace {
+            stations: pace.stations - before,
+            ..pace
+        };
+        let (leg, ends) = family.leg(&last);
+        let continuation = leg.continuation_between(ends, pace);
+        let start = match family.path.is_between_legs(last.parameter) {
+            true => continuation.start(&last.at, last.parameter, last.is_rising()),
+            false => Some(last.clone()),
+        };
+        let Some(start) = start else {
+            whole.stations.push(last);
+            whole.end = End::Lost;
+            return whole;
+        };
+        let curve = continuation.trace_on(start.clone(), first.as_ref(), proceed);
+        first = first.or(Some(start));
+        let events = curve.events.into_iter();
+        let events = events.map(|(state, event)| (before + state, event));
+        whole.events.extend(events);
+        whole.stations.extend(curve.stations);
+        whole.end = curve.end;
+        let last = whole.stations.last();
+        let goes_on = last.is_some_and(|last| family.path.is_between_legs(last.parameter));
+        if whole.end != End::Range || !goes_on {
+            return whole;
         }
     }
 }
