@@ -40,7 +40,7 @@ pub(super) fn solve(
         None => {
             let (found, fault) = find(problem, from, proceed);
             let redundant = redundant(problem, &found.program);
-            let (status, message) = judge(problem, &found.solution, fault, redundant.as_deref());
+            let (status, message) = judge(problem, &found, fault, redundant.as_deref());
             (found, status, message, redundant)
         }
     };
@@ -56,12 +56,12 @@ pub(crate) fn of_solution(
 ) -> Equilibrium {
     let redundant = redundant(problem, &program);
     let fault = problem.active_set_fault(&program, &solution.at.point);
-    let (status, message) = judge(problem, &solution, fault, redundant.as_deref());
     let found = Found {
         program,
         solution,
         error: OnceLock::new(),
     };
+    let (status, message) = judge(problem, &found, fault, redundant.as_deref());
     equilibrium(problem, found, status, message, redundant)
 }
 
@@ -265,14 +265,21 @@ fn redundant(problem: &Problem, program: &BeltProgram) -> Option<String> {
 /// Status and message of a search that was not infeasible from the outset.
 fn judge(
     problem: &Problem,
-    solution: &Solution<BeltPoint>,
+    Found {
+        program, solution, ..
+    }: &Found,
     fault: Option<String>,
     redundant: Option<&str>,
 ) -> (Status, String) {
+    // An elastic energy has a least value: without loads, a search that finds none has gone astray.
+    let outcome = match solution.outcome {
+        Outcome::Unbounded if !program.is_loaded() => Outcome::Stalled,
+        outcome => outcome,
+    };
     let tolerance = problem.tolerance();
     let largest = solution.residuals.largest();
     let (iterations, violation) = (solution.iterations, solution.residuals.constraint);
-    match solution.outcome {
+    match outcome {
         Outcome::Converged if let Some(fault) = fault => (Status::NotConverged, fault),
         Outcome::Converged => (
             Status::Converged,
@@ -311,13 +318,19 @@ fn judge(
                  angles in rad); move the supports closer, try another solver.bulge or more solver.elements"
             ),
         ),
-        Outcome::Stalled => (
-            Status::NotConverged,
-            format!(
-                "no step improves the shape any more, largest residual {largest:.1e} after {iterations} iterations; try \
-                 a tolerance above it or another solver.elements"
-            ),
-        ),
+        Outcome::Stalled => {
+            let advice = match largest <= CLEARLY_MISSED {
+                true => "a tolerance above it",
+                false => "another solver.bulge",
+            };
+            (
+                Status::NotConverged,
+                format!(
+                    "no step improves the shape any more, largest residual {largest:.1e} after {iterations} iterations; try \
+                     {advice} or another solver.elements"
+                ),
+            )
+        }
         Outcome::Unbounded => (
             Status::NotConverged,
             format!(
@@ -463,5 +476,38 @@ impl Forces {
                 .collect(),
             undetermined: names,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::{Axis, BeltSpec, Component, Place, SegmentSpec};
+
+    /// The message of a search that ends without a least energy.
+    fn message_without_a_least_energy(scenario: Scenario) -> String {
+        let problem = Problem::new(scenario).unwrap();
+        let mut found = start(&problem);
+        found.solution.outcome = Outcome::Unbounded;
+        let (status, message) = judge(&problem, &found, None, None);
+        assert_eq!(status, Status::NotConverged);
+        message
+    }
+
+    #[test]
+    fn test_only_a_loaded_belt_has_no_least_energy() {
+        let mut scenario = Scenario::new(BeltSpec::new(0.1, 1.0, vec![SegmentSpec::straight(1.0)]));
+        let clamp = |at, y: f64| SupportSpec {
+            position: Some([0.0, y, 0.0].map(Component::Held)),
+            rotation: Some([0.0; 3]),
+            ..SupportSpec::new(at)
+        };
+        scenario.supports = vec![clamp(Place::Start, 0.0), clamp(Place::End, 0.6)];
+        let unloaded = message_without_a_least_energy(scenario.clone());
+        assert!(unloaded.starts_with("no step improves the shape any more"));
+        scenario.supports[1].hinge = Some(Axis::Zeta);
+        scenario.supports[1].moment = Some(1.0);
+        let loaded = message_without_a_least_energy(scenario);
+        assert!(loaded.starts_with("the energy has no least value"));
     }
 }
