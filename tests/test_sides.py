@@ -158,7 +158,19 @@ def test_unclear_side_without_a_minimum_is_warned_of(angle: float) -> None:
     assert any("no minimum was found on the side of solver.bulge" in warning for warning in found.warnings)
 
 
-def test_belt_that_has_snapped_to_the_other_side_as_it_was_wound_is_warned_of() -> None:
-    found = solve(twisted(0.1, 0.0, 8.0 * math.pi))
-    assert found.side == -1
-    assert any("lies on the other side than solver.bulge" in warning for warning in found.warnings)
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_wound_belt_lies_on_the_side_of_the_bulge_by_a_twin_and_still_says_that_it_has_snapped(side: float) -> None:
+    tables = twisted(0.1, 0.0, 8.0 * math.pi)
+    tables["solver"]["bulge"] = [side, 0.0, 0.0]
+    found = solve(tables)
+    assert found.side == 1
+    assert any("has snapped on the way" in warning for warning in found.warnings)
+
+
+@pytest.mark.parametrize(("turn", "side"), [(2.0 * math.pi, -1), (-2.0 * math.pi, 1)])
+def test_loop_whose_turn_leaves_no_choice_of_the_side_is_warned_of(turn: float, side: int) -> None:
+    """Turned about the width, a loop lies to the left of its chord or to the right; its mirror image is turned back."""
+    found = solve(clamped((0.0, 0.4, 0.0), (0.0, 0.0, turn), elements=120, bulge=(1.0, 0.0, 0.0)))
+    assert found.side == side
+    warned = any("lies on the other side than solver.bulge" in warning for warning in found.warnings)
+    assert warned == (side == -1)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import fishbone as fb
-from helpers import ORIGIN, Json, belt, board, clamped, rotation_matrix, rotation_vector, solve, straight, support
+from helpers import ORIGIN, Json, arc, belt, board, clamped, rotation_matrix, rotation_vector, solve, straight, support
 
 TAU = 2.0 * math.pi
 
@@ -163,3 +163,61 @@ def test_whole_turn_about_any_axis_rolls_up_a_free_end(axis: int, angle: float) 
     found = solve(belt([support("start", ORIGIN, ORIGIN), support("end", None, rotation)]))
     assert found.stable
     assert found.energy == pytest.approx(0.5 * TAU**2, rel=1e-4)
+
+
+def pulled(turns: float, **options: Any) -> Json:
+    """A narrow strip under tension whose end slides along its line and is turned about it by half turns."""
+    end: Json = {"at": "end", "position": [0.0, "free", 0.0], "rotation": [0.0, turns * math.pi, 0.0]}
+    tables = belt([support("start", ORIGIN, ORIGIN), end], width=0.02, **options)
+    tables["loads"] = {"points": [{"at": "end", "force": [0.0, 50.0, 0.0]}]}
+    return tables
+
+
+def twist(found: fb.Equilibrium) -> float:
+    """Total twist of the strip, in half turns."""
+    return float(np.trapezoid(found.torsion, found.u)) / math.pi
+
+
+@pytest.mark.parametrize("bulge", [None, (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0)])
+@pytest.mark.parametrize(("turns", "elements"), [(1.9, None), (2.0, None), (-2.0, None), (2.0, 160), (-2.0, 160)])
+def test_strip_is_twisted_by_the_turn_asked_for(turns: float, elements: int | None, bulge: Any) -> None:
+    """Near two half turns the strip snaps, and its mirror image, twisted the other way, ends at the same frame."""
+    found = solve(pulled(turns, elements=elements, bulge=bulge))
+    assert twist(found) == pytest.approx(turns, rel=0.1)
+    assert found.stable
+
+
+@pytest.mark.parametrize("turns", [2.05, 3.0, -3.5, 4.0])
+def test_strip_that_has_lost_its_turn_says_so(turns: float) -> None:
+    found = solve(pulled(turns))
+    has_lost = abs(twist(found) - turns) > 0.1 * abs(turns)
+    words = ("has snapped on the way", "the other way round", "the shorter way round")
+    assert not has_lost or any(word in warning for word in words for warning in found.warnings)
+
+
+@pytest.mark.parametrize(("distance", "lean"), [(0.36, 0.15), (0.32, -0.1)])
+def test_turn_of_a_board_in_its_own_plane_is_no_winding(distance: float, lean: float) -> None:
+    """The board turns by half a turn as it lies flat; the vectors are one frame, a whole turn apart."""
+    segments = [straight(0.15), arc(0.2 * math.pi, 5.0), straight(0.15)]
+    energies = []
+    for side in (1.0, -1.0):
+        for angle in (math.pi + lean, lean - math.pi):
+            ends = [support("start", ORIGIN, ORIGIN), support("end", (0.0, 0.0, distance), (angle, 0.0, 0.0))]
+            found = solve(board(segments, ends, width=0.06, rigidity=1.0, bulge=(side, 0.0, 0.0)))
+            assert found.side == 1
+            assert found.stable
+            assert not found.warnings
+            energies.append(found.energy)
+    assert energies == pytest.approx([energies[0]] * 4, rel=1e-4)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_loop_lies_on_the_side_of_the_bulge_where_a_mirror_keeps_its_turn(axis: int) -> None:
+    """The mirror x → −x takes a turn about x to itself, and so does a half turn about y a turn about y."""
+    rotation = [0.0, 0.0, 0.0]
+    rotation[axis] = TAU
+    bulges = [(1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)]
+    end = (0.0, 0.4, 0.0)
+    loops = [solve(clamped(end, rotation, width=0.05, elements=100, bulge=bulge)) for bulge in bulges]
+    assert [loop.side for loop in loops] == [1, 1]
+    assert loops[0].energy == pytest.approx(loops[1].energy, rel=1e-6)

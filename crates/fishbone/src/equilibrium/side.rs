@@ -8,9 +8,10 @@ use super::{Equilibrium, Solved, Start, is_slender_on_graded_mesh};
 use crate::geometry::Pose;
 use crate::problem::program::{BeltPoint, BeltProgram, NodeSupport, Piece};
 use crate::problem::{Mesh, Problem};
-use crate::scenario::SAME_PLACE;
+use crate::scenario::{SAME_PLACE, Scenario};
 use nalgebra::{Matrix3, Vector2, Vector3};
 use stagewise::{Distance, Program};
+use std::f64::consts::PI;
 use std::ops::ControlFlow;
 
 /// Mean distance from the chords along the bulge up to which a belt lies on neither side, in U.
@@ -110,7 +111,7 @@ pub(super) fn on_side_of_bulge(
         return found;
     }
     let problem = &found.problem;
-    let images = Image::all(problem, solved);
+    let images = Image::all(problem, solved, |_| true);
     let [symmetric, others]: [Vec<_>; 2] =
         [true, false].map(|is_twin| images.iter().filter(|i| i.is_twin == is_twin).collect());
     let mut iterations = found.iterations;
@@ -150,7 +151,7 @@ pub(super) fn on_side_of_bulge(
     found
 }
 
-/// A wound belt, or its twin on the side of the bulge that is wound alike; without one a warning that it lies on the other
+/// A wound belt, or its twin on the side of the bulge that is wound by the same turns; without one a warning that it lies on the other
 /// side.
 pub(super) fn wound_on_side_of_bulge(
     mut found: Equilibrium,
@@ -159,8 +160,9 @@ pub(super) fn wound_on_side_of_bulge(
     let Some((solved, is_between)) = solved_minimum(&found).filter(|_| found.side() < 0) else {
         return found;
     };
-    for image in Image::all(&found.problem, solved) {
-        if image.is_twin && !image.changes_hand {
+    let keeps_turns = |mirror: &Mirror| mirror.keeps_turns(found.scenario());
+    for image in Image::all(&found.problem, solved, keeps_turns) {
+        if image.is_twin {
             let mut twin = image.twin(&found, solved, proceed);
             if twin.is_minimum() && twin.side() > 0 {
                 twin.iterations += found.iterations;
@@ -274,6 +276,30 @@ impl Mirror {
     /// Whether left-handed belts become right-handed.
     fn changes_hand(&self) -> bool {
         (self.normal * self.across < 0.0) != self.backwards
+    }
+
+    /// Whether the image of a belt that its supports have wound is wound by the same rotation vectors, and not by others to the
+    /// same frames.
+    fn keeps_turns(&self, scenario: &Scenario) -> bool {
+        /// Difference of rotation vectors that are the same, and sine of the angle between axes that are, in rad.
+        const SAME: f64 = 1e-6;
+        let supports = scenario.supports.iter().filter(|s| s.frame().is_some());
+        let vectors: Option<Vec<_>> = supports.map(|s| Some(Vector3::from(s.rotation?))).collect();
+        let vectors = vectors.unwrap_or_default();
+        let about_one_axis = |vector: &Vector3<f64>| {
+            vectors[0].cross(vector).norm() <= SAME * vectors[0].norm() * vector.norm()
+        };
+        if vectors.is_empty()
+            || !vectors.iter().all(about_one_axis)
+            || (self.backwards && vectors.len() != 2)
+        {
+            return !self.changes_hand();
+        }
+        // Rotation vectors are axial, and those from the end to the start are opposite.
+        let sense = if self.backwards { -1.0 } else { 1.0 };
+        let image = self.of_frame() * (sense * self.of_frame().determinant());
+        let mut turns = vectors.iter().map(|vector| vector - vectors[0]);
+        turns.all(|turn| (image * turn - turn).norm() <= SAME || turn.norm() <= PI)
     }
 
     /// The mirror of the belt's frame, S.
@@ -401,10 +427,7 @@ fn place(program: &BeltProgram, shape: &mut BeltPoint, other: &BeltPoint) {
 
 /// A mirror image on the side of the bulge.
 struct Image {
-    /// Whether start and end are exchanged.
-    is_backwards: bool,
-    /// Whether left-handed belts become right-handed.
-    changes_hand: bool,
+    mirror: Mirror,
     shape: BeltPoint,
     /// Its miss of the supports, lengths in U and angles in rad.
     miss: f64,
@@ -413,11 +436,13 @@ struct Image {
 }
 
 impl Image {
-    /// The images of a shape on the side of the bulge: twins first, then those that miss the supports least.
-    fn all(problem: &Problem, solved: &Solved) -> Vec<Self> {
+    /// The images of a shape by mirrors of some kind on the side of the bulge: twins first, then those that miss the supports
+    /// least.
+    fn all(problem: &Problem, solved: &Solved, is_of_kind: impl Fn(&Mirror) -> bool) -> Vec<Self> {
         let bulge = problem.bulge().normalize();
         let is_right = |image: &Self| side(image.mean_distance(&solved.program).dot(&bulge)) > 0;
-        let mut images: Vec<_> = Self::of_mirrors(solved, &bulge).filter(is_right).collect();
+        let images = Self::of_mirrors(solved, &bulge).filter(|image| is_of_kind(&image.mirror));
+        let mut images: Vec<_> = images.filter(is_right).collect();
         // Rounding must not choose between symmetry images.
         let rank = |image: &Self| if image.is_twin { 0.0 } else { image.miss };
         images.sort_by(|a, b| rank(a).total_cmp(&rank(b)));
@@ -451,8 +476,7 @@ impl Image {
             let miss = program.miss_of_supports(&shape);
             let is_level = (energy(&shape) - own).abs() <= LEVEL * own.abs();
             Self {
-                is_backwards: mirror.backwards,
-                changes_hand: mirror.changes_hand(),
+                mirror,
                 is_twin: miss <= MET && is_level,
                 shape,
                 miss,
@@ -477,7 +501,7 @@ impl Image {
         let twin = solve(problem, Start::Close(&mesh, &self.shape), proceed);
         let refined = twin
             .refined_for(problem, proceed)
-            .filter(|_| self.is_backwards);
+            .filter(|_| self.mirror.backwards);
         let right = |refined: &Equilibrium| refined.side() > 0;
         refined.filter(right).unwrap_or(twin)
     }
@@ -504,7 +528,7 @@ impl Image {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scenario::{BeltSpec, Component, Place, Scenario, SegmentSpec, SupportSpec};
+    use crate::scenario::{BeltSpec, Component, Place, SegmentSpec, SupportSpec};
 
     /// A belt between parallel clamps, or between pins.
     fn problem(end: [f64; 3], is_clamped: bool, bulge: [f64; 3]) -> Problem {

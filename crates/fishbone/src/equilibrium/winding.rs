@@ -2,7 +2,7 @@
 
 use super::side::wound_on_side_of_bulge;
 use super::{Equilibrium, Status, beside_the_guess, minimum_next_to, of_solution};
-use crate::problem::program::{BeltProgram, Hold, Piece};
+use crate::problem::program::{BeltPoint, BeltProgram, Hold, Piece};
 use crate::problem::{Mesh, Problem, number};
 use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 use stagewise::{Distance, FollowSettings, Follower};
@@ -18,8 +18,8 @@ pub(super) const MOST: f64 = 4.0 * TAU + 1e-3;
 const BEGIN: f64 = FRAC_PI_2;
 
 /// The minimum of a problem whose supports are turned by more than half a turn, followed from a quarter turn; `None` of
-/// another problem, and of more than [`MOST`]. Where the belt cannot be followed, it is turned the shorter way round, and a
-/// warning says so.
+/// another problem, of one whose board turns so by itself, and of more than [`MOST`]. Where the belt cannot be followed, it is
+/// turned the shorter way round, and a warning says so.
 pub(super) fn wound(
     problem: &Problem,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
@@ -28,9 +28,18 @@ pub(super) fn wound(
     if !(MORE_THAN_HALF..=MOST).contains(&angle) {
         return None;
     }
+    let turned_by_itself = parities_beside_flat(problem).and_then(|parities_beside_flat| {
+        let found = beside_the_guess(problem, proceed);
+        (parities(&found) == parities_beside_flat).then_some(found)
+    });
+    if turned_by_itself.is_some() {
+        return turned_by_itself;
+    }
     for way in Way::all(problem, angle) {
-        if let Some(found) = way.end(problem, proceed) {
-            return Some(wound_on_side_of_bulge(found, proceed));
+        if let Some((found, has_snapped)) = way.end(problem, proceed) {
+            let mut found = wound_on_side_of_bulge(found, proceed);
+            found.warnings.extend(way.warnings(has_snapped));
+            return Some(found);
         }
     }
     let mut found = beside_the_guess(problem, proceed);
@@ -90,32 +99,48 @@ impl Way {
         self.goal.turned_back(MORE_THAN_HALF, angle / self.angle)
     }
 
-    /// The minimum at the end of the way; `None` where the belt is lost on the way.
+    /// The warnings of the way itself.
+    fn warnings(&self, has_snapped: bool) -> Vec<String> {
+        let angle = number(self.angle);
+        let snapped = has_snapped.then(|| {
+            format!(
+                "the belt has snapped on the way on which its support was turned by {angle} rad, and may have undone whole turns"
+            )
+        });
+        let other = (self.end != self.angle).then(|| {
+            format!(
+                "a support is turned by {angle} rad, and the belt could only be followed the other way round, to two whole \
+                 turns less: it is turned by {} rad",
+                number(self.end)
+            )
+        });
+        snapped.into_iter().chain(other).collect()
+    }
+
+    /// The minimum at the end of the way, and whether it has snapped on the way; `None` where the belt is lost on the way.
     fn end(
         &self,
         problem: &Problem,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
-    ) -> Option<Equilibrium> {
+    ) -> Option<(Equilibrium, bool)> {
         /// Angle of a leg of the way, in rad.
         const LEG: f64 = 0.5;
+        /// How often a leg is halved on which the belt is lost.
+        const HALVINGS: usize = 2;
         /// Displacement up to which the refined minimum is the same, in U.
         const SAME: f64 = 0.1;
         let (begin, mut found) = self.begin(proceed)?;
         let legs = ((self.end - begin).abs() / LEG).ceil();
         let place = |leg: f64| begin + (self.end - begin) * leg / legs;
-        let turns = parities(&found);
         let mut has_snapped = false;
         for leg in 1..=legs as usize {
             let ends = [leg - 1, leg].map(|leg| place(leg as f64));
-            has_snapped |= self.go_on(&mut found, ends, proceed)?;
-            if parities(&found) != turns {
-                return None;
-            }
+            has_snapped |= self.go_on_in_parts(&mut found, ends, HALVINGS, proceed)?;
         }
         let iterations = found.iterations;
         let refined = found.refined_for(problem, proceed);
         let is_same = |refined: &Equilibrium| found.displacement(refined) <= SAME;
-        let mut end = match refined.filter(is_same) {
+        let end = match refined.filter(is_same) {
             Some(refined) => Equilibrium {
                 iterations: refined.iterations + iterations,
                 ..refined
@@ -125,13 +150,7 @@ impl Way {
                 ..found
             },
         };
-        if has_snapped {
-            end.warnings.push(format!(
-                "the belt has snapped on the way on which its support was turned by {} rad",
-                number(self.angle)
-            ));
-        }
-        Some(end)
+        end.is_minimum().then_some((end, has_snapped))
     }
 
     /// The angle at which the way begins and a minimum there; of a straight board one that turns by this angle, and not the
@@ -151,6 +170,27 @@ impl Way {
             let is_right = !is_straight || parities(&found).iter().all(|is_alike| *is_alike);
             (found.status == Status::Converged && is_right).then_some((begin, found))
         })
+    }
+
+    /// Follows a minimum from one angle to another as [`Self::go_on`] does, in halves where it is lost or its parities change.
+    fn go_on_in_parts(
+        &self,
+        found: &mut Equilibrium,
+        [from, to]: [f64; 2],
+        halvings: usize,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Option<bool> {
+        let mut next = found.clone();
+        let has_snapped = self.go_on(&mut next, [from, to], proceed);
+        if has_snapped.is_some() && parities(&next) == parities(found) {
+            *found = next;
+            return has_snapped;
+        }
+        let halvings = halvings.checked_sub(1)?;
+        let middle = 0.5 * (from + to);
+        let first = self.go_on_in_parts(found, [from, middle], halvings, proceed)?;
+        let second = self.go_on_in_parts(found, [middle, to], halvings, proceed)?;
+        Some(first || second)
     }
 
     /// Follows a minimum from one angle to another, and gives whether it has snapped on the way; `None` where it is lost.
@@ -180,13 +220,90 @@ impl Way {
         let before = follower.point().clone();
         let mut next = match followed.arrived && fault.is_none() {
             true => of_solution(&problem, program, follower.solution()),
-            false => minimum_next_to(&problem, follower.point(), proceed),
+            false => settled(&problem, follower.point(), proceed),
         };
         next.iterations += found.iterations + followed.iterations;
         *found = next;
         let after = found.certified().ok()?;
         Some(followed.jump > 0.0 || after.at.point.distance(&before) > ANOTHER)
     }
+}
+
+/// The minimum to which a belt settles from a shape; where the search has not come to its end, it goes on.
+fn settled(
+    problem: &Problem,
+    shape: &BeltPoint,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Equilibrium {
+    /// Searches after the first one.
+    const MORE: usize = 3;
+    let mut found = minimum_next_to(problem, shape, proceed);
+    for _ in 0..MORE {
+        if found.status == Status::Converged {
+            break;
+        }
+        let Some(shape) = found.solved.as_ref().map(|solved| solved.at.point.clone()) else {
+            break;
+        };
+        let iterations = found.iterations;
+        found = minimum_next_to(problem, &shape, proceed);
+        found.iterations += iterations;
+    }
+    found
+}
+
+/// The [`parities`] of a belt that turns from one held frame to the next by no more than half a turn more or less than its flat
+/// board does, where a way from a quarter turn leads to such a belt; `None` where it leads to another one, and where frames are
+/// not held by rotation vectors about one axis.
+fn parities_beside_flat(problem: &Problem) -> Option<Vec<bool>> {
+    /// Sine of the angle between axes that are the same, dimensionless.
+    const PARALLEL: f64 = 1e-9;
+    let program = problem.program(problem.elements());
+    let own_turn = |node: usize| {
+        let turn = |piece: &Piece| match piece {
+            Piece::Strip(element) => element.geodesic * element.length,
+            Piece::Joint { angle } => *angle,
+            Piece::Rigid { .. } => 0.0,
+        };
+        program.pieces[..node].iter().map(turn).sum::<f64>()
+    };
+    let held: Vec<_> = held_frames(&program, problem).collect();
+    let frames = problem.scenario().supports.iter();
+    let frames = frames.filter(|support| support.frame().is_some()).count();
+    if frames < 2 || held.len() < frames {
+        return None;
+    }
+    let (start, first) = held[0];
+    let normal = UnitQuaternion::from_scaled_axis(first) * Vector3::x();
+    let whole_turns = |(node, vector): &(usize, Vector3<f64>)| {
+        let turn = vector - first;
+        if first.cross(vector).norm() > PARALLEL * first.norm() * vector.norm() {
+            return None;
+        }
+        let flat = normal * (own_turn(*node) - own_turn(start));
+        let axis = turn.try_normalize(PARALLEL).unwrap_or(normal);
+        let begin = match turn.norm() > MORE_THAN_HALF {
+            true => BEGIN * axis,
+            false => turn,
+        };
+        let away = |turn: &Vector3<f64>, whole: f64| (turn + whole * TAU * axis - flat).norm();
+        let nearer = |a: &f64, b: &f64| away(&begin, *a).total_cmp(&away(&begin, *b));
+        let whole = [0.0, -1.0, 1.0].into_iter().min_by(nearer)?;
+        (away(&turn, whole) <= MORE_THAN_HALF).then_some(whole)
+    };
+    let whole_turns: Vec<_> = held.iter().map(whole_turns).collect::<Option<_>>()?;
+    let is_alike = |ends: &[f64]| (ends[0] == 0.0) == (ends[1] == 0.0);
+    Some(whole_turns.windows(2).map(is_alike).collect())
+}
+
+/// The nodes and the rotation vectors of the supports that hold a whole frame by such a vector.
+fn held_frames<'a>(
+    program: &'a BeltProgram,
+    problem: &'a Problem,
+) -> impl Iterator<Item = (usize, Vector3<f64>)> + 'a {
+    let held = program.supports.iter().zip(&problem.scenario().supports);
+    let held = held.filter(|(support, _)| matches!(support.hold, Hold::Frame(_)));
+    held.filter_map(|(support, given)| Some((support.node, given.rotation?.into())))
 }
 
 /// Whether the belt turns from one held frame to the next by the rotation between them, and not by a whole turn more or less:
@@ -202,17 +319,10 @@ fn parities(found: &Equilibrium) -> Vec<bool> {
         let frame = Rotation3::from_matrix_unchecked(solved.at.point.poses[node].frame);
         UnitQuaternion::from_rotation_matrix(&frame)
     };
-    let held = solved
-        .program
-        .supports
-        .iter()
-        .zip(&found.scenario().supports);
-    let held = held.filter(|(support, _)| matches!(support.hold, Hold::Frame(_)));
-    let held = held.filter_map(|(support, given)| {
-        let turn = UnitQuaternion::from_scaled_axis(Vector3::from(given.rotation?));
-        Some((support.node, turn))
-    });
-    let held: Vec<_> = held.collect();
+    let held = held_frames(&solved.program, &found.problem);
+    let held: Vec<_> = held
+        .map(|(node, vector)| (node, UnitQuaternion::from_scaled_axis(vector)))
+        .collect();
     let is_alike = |ends: &[(usize, UnitQuaternion<f64>)]| {
         let [(from, start), (to, end)] = [ends[0], ends[1]];
         let step = |k: usize| {
