@@ -33,10 +33,11 @@ impl Search {
     }
 }
 
-/// The shape slid along itself until the square rib with the least bend is at the seam.
+/// The shape slid along itself until the square rib with the least bend is at the seam, unless a square rib is there already.
 fn slid_to_square_rib(program: &BeltProgram, point: &BeltPoint) -> BeltPoint {
     let nodes = program.nodes();
-    let Some(seam) = square_rib(&nodes, point) else {
+    let is_there = point.fields[0][1] == 0.0;
+    let Some(seam) = square_rib(&nodes, point).filter(|_| !is_there) else {
         return point.clone();
     };
     let slid = |u: f64| -> Vector2<f64> {
