@@ -197,6 +197,12 @@ def verdicts() -> Iterator[list[str]]:
         "132.88, 3",
         "boundary value problem",
     ]
+    wide = {"rigidity": 1.0, "closed": True, "half_turns": 1}
+    for elements in (480, 640, 1280):
+        mobius = solve([], width=0.5, belt=wide, solver={"elements": elements})
+        after = f"{mobius.energy:.2f}" if mobius.status == "converged" else "not converged"
+        before = "not converged" if elements < 1280 else ""
+        yield [f"Möbius band, V = 0.5 U, {elements} elements: energy", before, after, "219.03", "limit of the meshes"]
 
 
 def radii() -> Iterator[list[str]]:

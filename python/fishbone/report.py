@@ -27,7 +27,6 @@ DIGITS = 5
 """Significant digits, about the accuracy of the default mesh."""
 ENDS: dict[End, str] = {
     "closed": "ends where it began",
-    "event": "ends where it meets another branch head on",
     "budget": "has used up its states before the end of the path",
     "lost": "ends where no step, however short, leads on",
     "no_slack": "ends where the belt has no slack left",
