@@ -151,8 +151,8 @@ pub(super) fn on_side_of_bulge(
     found
 }
 
-/// A wound belt, or its twin on the side of the bulge that is wound by the same turns; without one a warning that it lies on the other
-/// side.
+/// A wound belt, or its twin on the side of the bulge that is wound by the same turns; without one a warning that it lies on
+/// the other side.
 pub(super) fn wound_on_side_of_bulge(
     mut found: Equilibrium,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
