@@ -14,7 +14,7 @@ import pytest
 from scipy.optimize import brentq
 from scipy.special import j0
 
-from helpers import belt, solve_any, support
+from helpers import arc, belt, board, solve_any, support
 
 FOLDER = Path(__file__).parents[1] / "benchmarks"
 
@@ -91,16 +91,11 @@ def test_clamps_of_a_strip_are_never_out_of_reach(seed: int) -> None:
     assert solve_any(tables).status != "infeasible"
 
 
-WIDE = {"segments": [{"kind": "arc", "length": 1.0, "curvature": math.pi / 2.0}], "width": 0.3}
-
-
 def quarter_arc(lift: float) -> dict[str, Any]:
     """A quarter of a wide ring, its ends held as on the flat board but for a lift of one end off the plane."""
     radius = 2.0 / math.pi
     end = support("end", [lift, radius, radius], [math.pi / 2.0, 0.0, 0.0])
-    tables = belt([support("start", [0, 0, 0], [0, 0, 0]), end], width=WIDE["width"])
-    tables["belt"] |= WIDE
-    return tables
+    return board([arc(1.0, math.pi / 2.0)], [support("start", [0, 0, 0], [0, 0, 0]), end], width=0.3)
 
 
 def test_end_beyond_the_way_along_an_arc_is_infeasible_at_once() -> None:
@@ -111,6 +106,6 @@ def test_end_beyond_the_way_along_an_arc_is_infeasible_at_once() -> None:
     lift = math.sqrt(longest**2 - 2.0 * radius**2)
     found = solve_any(quarter_arc(1.01 * lift))
     assert (found.status, found.iterations) == ("infeasible", 0)
-    [belt_length] = [float(word) for word in found.message.split("(")[1].split(")")[:1]]
+    belt_length = float(found.message.split("(")[1].split(")")[0])
     assert longest <= belt_length <= (1.0 + 1e-4) * longest
     assert solve_any(quarter_arc(0.0)).status == "converged"

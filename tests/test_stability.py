@@ -333,7 +333,7 @@ def test_overhang_that_bears_nothing_leaves_an_arch_stable(elements: int | None)
 
 
 @pytest.mark.parametrize("height", [0.0, 0.05])
-def test_taut_span_does_not_make_a_belt_unstable(height: float) -> None:
+def test_span_without_slack_does_not_make_a_belt_unstable(height: float) -> None:
     """Its bend is what rounding of its length leaves; the slack span bends as it does alone."""
     middle = support(0.5, (0.0, 0.5, 0.0), (0.0, 0.0, 0.0))
     end = support("end", (0.0, 0.8, height), (0.0, 0.0, 0.0))

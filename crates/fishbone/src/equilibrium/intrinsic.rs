@@ -385,7 +385,7 @@ fn warnings(
     let weightless = scenario.loads.gravity.is_some_and(|g| g != [0.0; 3])
         && scenario.belt.density_value() == 0.0;
     let is_stable = stability.and_then(|stability| stability.is_stable());
-    let not_told = status == Status::Converged && is_stable.is_none() && !flat;
+    let is_undecided = status == Status::Converged && is_stable.is_none() && !flat;
     let turned = scenario
         .supports
         .iter()
@@ -401,8 +401,8 @@ fn warnings(
         flat.then(|| {
             "a part of the loaded belt has stayed flat: whether it would rather buckle could not be told".to_owned()
         }),
-        not_told.then(|| {
-            "whether the equilibrium is a minimum of the energy could not be told: a motion hardly changes it".to_owned()
+        is_undecided.then(|| {
+            "whether the equilibrium is a minimum of the energy is undecided: some motion hardly changes the energy".to_owned()
         }),
         (is_stable == Some(false))
             .then(|| "the equilibrium is no minimum of the energy: try another solver.bulge".to_owned()),

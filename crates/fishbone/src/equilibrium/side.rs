@@ -151,8 +151,8 @@ pub(super) fn on_side_of_bulge(
     found
 }
 
-/// A wound belt, or its twin on the side of the bulge that is wound by the same turns; without one a warning that it lies on
-/// the other side.
+/// A wound belt, or its symmetry image on the side of the bulge that is wound by the same turns; without one a warning that the
+/// belt lies on the other side.
 pub(super) fn wound_on_side_of_bulge(
     mut found: Equilibrium,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
@@ -196,8 +196,7 @@ fn minimum_on_side(
     let (search, mut program) = (Search::of(problem), program.clone());
     let near = search.only_from(&program, shape.clone(), barrier, proceed);
     let (near, misfit) = settle(problem, &search, &mut program, near, proceed);
-    let poses = &near.at.point.poses;
-    let distance = mean_distance(&program.nodes(), poses, &held_nodes(&program));
+    let distance = mean_distance_of(&program, &near.at.point);
     let is_elsewhere = side(distance.dot(&problem.bulge().normalize())) <= 0;
     if is_elsewhere && near.is_minimum() && misfit.is_none() {
         return Err(near.iterations);
@@ -410,6 +409,11 @@ fn held_nodes(program: &BeltProgram) -> Vec<usize> {
     held.map(|support| support.node).collect()
 }
 
+/// Mean distance of a shape of a programme from its chords, in U.
+fn mean_distance_of(program: &BeltProgram, shape: &BeltPoint) -> Vector3<f64> {
+    mean_distance(&program.nodes(), &shape.poses, &held_nodes(program))
+}
+
 /// Moves a shape by the mean distance to the places at which supports hold it; along an axis on which none does, to where
 /// another shape is.
 fn place(program: &BeltProgram, shape: &mut BeltPoint, other: &BeltPoint) {
@@ -436,12 +440,12 @@ struct Image {
 }
 
 impl Image {
-    /// The images of a shape by mirrors of some kind on the side of the bulge: twins first, then those that miss the supports
-    /// least.
-    fn all(problem: &Problem, solved: &Solved, is_of_kind: impl Fn(&Mirror) -> bool) -> Vec<Self> {
+    /// The mirror images of a shape on the side of the bulge, by the mirrors that pass a test: symmetry images first, then by
+    /// rising miss of the supports.
+    fn all(problem: &Problem, solved: &Solved, passes: impl Fn(&Mirror) -> bool) -> Vec<Self> {
         let bulge = problem.bulge().normalize();
         let is_right = |image: &Self| side(image.mean_distance(&solved.program).dot(&bulge)) > 0;
-        let images = Self::of_mirrors(solved, &bulge).filter(|image| is_of_kind(&image.mirror));
+        let images = Self::of_mirrors(solved, &bulge).filter(|image| passes(&image.mirror));
         let mut images: Vec<_> = images.filter(is_right).collect();
         // Rounding must not choose between symmetry images.
         let rank = |image: &Self| if image.is_twin { 0.0 } else { image.miss };
@@ -486,7 +490,7 @@ impl Image {
 
     /// Mean distance from the chords, in U.
     fn mean_distance(&self, program: &BeltProgram) -> Vector3<f64> {
-        mean_distance(&program.nodes(), &self.shape.poses, &held_nodes(program))
+        mean_distance_of(program, &self.shape)
     }
 
     /// The minimum at the image of a minimum.
