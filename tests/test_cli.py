@@ -588,6 +588,24 @@ def test_follow_says_where_the_radius_is_below_its_limit_with_or_without_a_figur
     assert_one_line(run("follow", planar_file, *TURN, "--radius-limit", "0.01")[2], f"the least radius is {least}")
 
 
+@pytest.mark.parametrize("elements", [None, 80])
+def test_follow_warns_of_a_mesh_that_is_too_coarse_for_the_path(run, elements):
+    """A strip is pulled aside from its clamp, which bends it in a layer thinner than an element of 80."""
+    tables = {
+        "belt": {"width": 0.1, "rigidity": 1.0, "segments": [{"kind": "straight", "length": 1.0}]},
+        "supports": [{"at": "start", "position": [0.0, 0.0, 0.0], "rotation": [0.0, 0.0, 0.6]}],
+        "loads": {"points": [{"at": "end", "force": [0.0, 10.0, 0.0]}]},
+        "solver": {} if elements is None else {"elements": elements},
+    }
+    Path("pulled.json").write_text(json.dumps(tables), "utf-8")
+    code, _, err = run("follow", "pulled.json", "--to", "loads.points[0].force[1]=1e5")
+    assert code == 0
+    if elements is None:
+        assert err == ""
+    else:
+        assert_one_line(err, "warning: the error by the mesh is up to 3", "leave out solver.elements")
+
+
 def test_follow_writes_all_outputs_and_nothing_else(run, planar_file, turned):
     code, _, _ = run("follow", planar_file, *TURN, "--out", "a.json", "--table", "a.csv", "--figure", "a.png")
     assert code == 0

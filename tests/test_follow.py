@@ -23,6 +23,13 @@ ANGLE = "supports[1].rotation[2]"
 PUSH = "loads.points[0].force[1]"
 
 
+def on_one_mesh(scenario: fb.Scenario) -> fb.Scenario:
+    """The scenario on a fixed mesh: along a path it is one discrete belt, whose identities hold to rounding."""
+    tables = scenario.to_dict()
+    tables["solver"]["elements"] = 80
+    return fb.Scenario.from_dict(tables)
+
+
 def arch(distance: float = 0.6, angle: float = 0.0) -> fb.Scenario:
     """The planar belt between clamps in line, its end turned."""
     tables = fb.load(ROOT / "scenarios" / "planar.toml").to_dict()
@@ -163,7 +170,8 @@ def test_energy_changes_by_the_moment_of_the_end_that_is_turned_through_the_fold
 
 
 def test_energy_changes_by_the_force_of_the_end_that_is_moved_aside():
-    [branch] = fb.follow(arch(), {"supports[1].position[2]": 0.25}, step=0.02, branches=1).branches
+    start = on_one_mesh(arch())
+    [branch] = fb.follow(start, {"supports[1].position[2]": 0.25}, step=0.02, branches=1).branches
     rate, work = rates_of(branch, branch.reaction("end").force[:, 2])
     np.testing.assert_allclose(rate, work, atol=1e-5 * np.abs(rate).max())
 
@@ -249,6 +257,9 @@ def test_a_belt_that_is_drawn_straight_ends_there_and_branches_off_nowhere():
 
 def test_reports_are_those_of_the_equilibria(sheared):
     [branch] = sheared.branches
+    meshes = [branch.equilibrium(state).u for state in range(len(branch))]
+    places = max(meshes, key=len)
+    assert len(meshes[0]) < len(places)
     for state in (0, len(branch) // 2, -1):
         shape = branch.equilibrium(state)
         assert branch.energy[state] == shape.energy
@@ -257,11 +268,49 @@ def test_reports_are_those_of_the_equilibria(sheared):
         assert branch.least_spine_radius[state] == shape.least_spine_radius.value
         assert branch.rib_margin[state] == shape.rib_margin.value
         assert tuple(branch.area_radii[state]) == shape.bend_radius.area
-        np.testing.assert_array_equal(branch.position[state], shape.position)
+        # On a mesh with fewer elements the shape is read off between its nodes.
+        np.testing.assert_allclose(branch.position[state], spine_at(shape, places), atol=1e-6)
+        assert branch.error[state] == max(shape.error)
         for support in ("start", "end"):
             for along, at in zip(branch.reaction(support), shape.reaction(support), strict=True):
                 np.testing.assert_array_equal(along[state], at)
         assert shape.scenario.to_dict()["supports"][1]["position"][2] == branch.parameter[state]
+
+
+def pulled(**solver: int) -> fb.Branch:
+    """A strip clamped at an angle to the force that pulls its other end, which straightens it but for a layer."""
+    belt = {"width": 0.1, "rigidity": 1.0, "segments": [{"kind": "straight", "length": 1.0}]}
+    clamp = {"at": "start", "position": [0.0, 0.0, 0.0], "rotation": [0.0, 0.0, 0.6]}
+    loads = {"points": [{"at": "end", "force": [0.0, 10.0, 0.0]}]}
+    tables = {"energy": "wunderlich", "belt": belt, "supports": [clamp], "loads": loads, "solver": solver}
+    [branch] = fb.follow(fb.Scenario.from_dict(tables), {"loads.points[0].force[1]": 1e5}).branches
+    return branch
+
+
+def layer_radius(pull: np.ndarray) -> np.ndarray:
+    """The tightest bend of a long strip pulled at 0.6 to its clamp, by the integral of its equation along the arc."""
+    return 1.0 / (2.0 * np.sqrt(pull) * np.sin(0.3))
+
+
+def test_the_mesh_is_graded_anew_along_a_path_where_the_bend_gets_too_sharp_for_it():
+    branch = pulled()
+    assert branch.end == "range"
+    far = branch.parameter > 100.0
+    np.testing.assert_allclose(branch.least_spine_radius[far], layer_radius(branch.parameter[far]), rtol=1e-2)
+    assert branch.error.max() < 1e-2
+    assert len(branch.equilibrium(-1).u) > len(branch.equilibrium(0).u)
+
+
+def test_a_fixed_mesh_tells_what_it_makes_of_a_path():
+    """The layer is thinner than an element: the radius is off, and the error tells by how much, to a factor of 3."""
+    branch = pulled(elements=80)
+    true = branch.least_spine_radius / layer_radius(branch.parameter) - 1.0
+    assert true[-1] > 0.5
+    coarse = true > 0.01
+    ratio = branch.error[coarse] / true[coarse]
+    assert ratio.min() > 1.0 / 3.0
+    assert ratio.max() < 3.0
+    assert {len(branch.equilibrium(state).u) for state in (0, -1)} == {81}
 
 
 def test_arrays_have_the_documented_shapes_and_belong_to_the_caller(turned):
@@ -323,7 +372,7 @@ def test_a_support_is_led_through_pose_after_pose():
 def test_an_arch_is_led_there_and_back(snaps):
     """At the pose between, the way turns back at once. The arch leans over on the way there, and stands up again."""
     poses = [([0.0, 0.3, 0.0], [0.0, 1.5, 0.0]), ([0.0, 0.6, 0.0], [0.0, 0.0, 0.0])]
-    diagram = fb.follow(arch(), fb.Poses(poses), snaps=snaps)
+    diagram = fb.follow(on_one_mesh(arch()), fb.Poses(poses), snaps=snaps)
     trunk = diagram.branches[0]
     assert (diagram.is_complete, trunk.end, trunk.parameter[-1]) == (True, "range", 2.0)
     assert trunk.energy[-1] == pytest.approx(trunk.energy[0], rel=1e-8)
@@ -383,8 +432,9 @@ def test_a_fold_next_to_a_pose_is_met_only_before_the_pose(step, past, turned):
 
 def test_a_screw_and_a_line_lead_to_one_end_by_different_ways():
     poses = [([0.0, 0.7, 0.1], [0.0, 0.8, 0.0])]
+    start = on_one_mesh(arch())
     line, screw = (
-        fb.follow(arch(), fb.Poses(poses, motion=motion), branches=1).branches[0] for motion in ("straight", "screw")
+        fb.follow(start, fb.Poses(poses, motion=motion), branches=1).branches[0] for motion in ("straight", "screw")
     )
     np.testing.assert_allclose(line.position[-1], screw.position[-1], atol=1e-5)
     middle = [np.argmin(np.abs(branch.parameter - 0.5)) for branch in (line, screw)]

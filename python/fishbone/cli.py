@@ -319,6 +319,7 @@ def follow(  # noqa: PLR0913 - one for each option
         click.echo(text, nl=False)
     else:
         _print_diagram(diagram)
+    _warn_of_coarse_mesh(file, diagram)
     if radius_limit is not None:
         _compare_radius(file, diagram, radius_limit)
     if not diagram.is_complete:
@@ -349,6 +350,15 @@ def _followed(
             # The branch computes and keeps its quantities at the first access.
             _ = branch.energy
     return diagram
+
+
+def _warn_of_coarse_mesh(file: Path, diagram: Diagram) -> None:
+    """Prints where the mesh makes a large error on a path, if anywhere."""
+    from fishbone.report import coarse_mesh  # noqa: PLC0415
+
+    warning = coarse_mesh(diagram)
+    if warning is not None:
+        click.echo(f"fishbone: {file}: {warning}", err=True)
 
 
 def _compare_radius(file: Path, diagram: Diagram, limit: float) -> None:

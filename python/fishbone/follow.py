@@ -110,11 +110,11 @@ class _Report(NamedTuple):
     rib_margin: Floats
     stable: list[bool | None]
     status: list[Status]
-    residual: Floats
+    residual_and_error: list[Floats]
 
 
 class Branch:
-    """A curve of equilibria: m states in order, with n nodes each.
+    """A curve of equilibria: m states in order.
 
     The quantities of the states are computed at first use. Arrays are copies.
 
@@ -193,7 +193,18 @@ class Branch:
 
         Shapes: (m,).
         """
-        return self._report.residual.copy()
+        return self._report.residual_and_error[0].copy()
+
+    @property
+    def error(self) -> Floats:
+        """The largest of the errors by the mesh of each state, as `Equilibrium.error`, relative; NaN where not known.
+
+        The mesh is graded anew on the way where its error is ten times `solver.accuracy`, or fifty times where ribs
+        turn with `fishbone` or `sadowsky`, unless `solver.elements` fixes it.
+
+        Shapes: (m,).
+        """
+        return self._report.residual_and_error[1].copy()
 
     @property
     def least_bend_radius(self) -> Floats:
@@ -230,7 +241,7 @@ class Branch:
 
     @property
     def position(self) -> Floats:
-        """Spine positions x(u).
+        """Spine positions x(u), at the nodes of the state with the most nodes.
 
         Shapes: (m, n, 3).
         """
@@ -329,8 +340,9 @@ class Diagram:
         The columns are branch, state, parameter, energy, height, stable, negative_modes, event (its kind, or empty),
         supports[0].force.x … supports[k].moment.z, least_spine_radius, bend_radius.p999, bend_radius.p99,
         bend_radius.p95 (exceeded on 99.9, 99 and 95 % of the area), least_bend_radius (over the width; falls with the
-        mesh), rib_margin, status, residual, confirmed (of the event; True without one), jump, released, and angle along
-        poses that have one. Where nothing bends the radii on the spine and over the width are NaN.
+        mesh), rib_margin, status, residual, error (the largest by the mesh), confirmed (of the event; True without
+        one), jump, released, and angle along poses that have one. Where nothing bends the radii on the spine and over
+        the width are NaN.
 
         A branch that ends where the belt snaps has one row more, of the minimum after the snap: its event is "snap",
         and jump and released are the size of the snap, NaN in other rows.
@@ -597,6 +609,7 @@ def _snap_row(index: int, event: Event, shape: Equilibrium) -> dict[str, Any]:
         "rib_margin": shape.rib_margin.value,
         "status": shape.status,
         "residual": max(shape.residuals),
+        "error": math.nan if shape.error is None else np.nanmax(shape.error),
         "confirmed": event.confirmed,
         "jump": event.jump,
         "released": event.released,
@@ -638,6 +651,7 @@ def _columns(index: int, branch: Branch) -> Columns:
         "rib_margin": branch.rib_margin,
         "status": np.array(branch.status),
         "residual": branch.residual,
+        "error": branch.error,
         "confirmed": confirmed,
         "jump": np.full(count, math.nan),
         "released": np.full(count, math.nan),

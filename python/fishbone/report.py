@@ -86,6 +86,10 @@ def _left_out(events: Sequence[Event]) -> str:
     return f"{count} of {len(events)} events are left out that a finer mesh does not confirm: try more solver.elements"
 
 
+FAR_BEYOND = 50.0
+"""Largest error by the mesh along a path, over the accuracy, that is not warned of."""
+
+
 def shortfall(diagram: Diagram) -> str:
     """One line: where and why a path is not followed to its end."""
     # A belt that is led along its minima goes from branch to branch, else the others leave the first.
@@ -109,6 +113,19 @@ def _ending(branch: Branch) -> str:
     lost = "ends where the belt loses its stability, and no minimum is found beyond"
     known = "" if last.confirmed else ", which a finer mesh does not confirm"
     return (lost if last.snapped is None else ENDS[branch.end]) + known
+
+
+def coarse_mesh(diagram: Diagram) -> str | None:
+    """One line: where along a path the mesh makes the largest error; None if it is not clearly beyond the accuracy."""
+    solver = diagram.start.scenario.to_dict()["solver"]
+    error = np.concatenate([branch.error for branch in diagram.branches])
+    places = np.concatenate([branch.parameter for branch in diagram.branches])
+    error = np.where(np.isnan(error), 0.0, error)
+    worst = int(error.argmax())
+    if error[worst] <= FAR_BEYOND * solver["accuracy"]:
+        return None
+    advice = "" if solver.get("elements") is None else "; leave out solver.elements, or give more"
+    return f"warning: the error by the mesh is up to {error[worst]:.1e}, at {_along(diagram, places[worst])}{advice}"
 
 
 def below_limit(diagram: Diagram, limit: float) -> str:

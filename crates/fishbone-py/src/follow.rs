@@ -123,7 +123,7 @@ type Event = (
 );
 
 /// Parameter, energy, height, forces and moments of the supports, least bend radius, least radius on the spine, radii exceeded
-/// on 99.9, 99 and 95 % of the area, rib margin, whether it is stable, status and largest residual.
+/// on 99.9, 99 and 95 % of the area, rib margin, whether it is stable, status, largest residual and largest error by the mesh.
 type Report<'py> = (
     Scalars<'py>,
     Scalars<'py>,
@@ -136,7 +136,7 @@ type Report<'py> = (
     Scalars<'py>,
     Vec<Option<bool>>,
     Vec<&'static str>,
-    Scalars<'py>,
+    [Scalars<'py>; 2],
 );
 
 #[pymethods]
@@ -233,20 +233,22 @@ impl Diagram {
             column(|s| s.rib_margin),
             summaries.iter().map(Summary::stable).collect(),
             summaries.iter().map(|s| s.status.name()).collect(),
-            column(|s| s.residuals.largest()),
+            [
+                column(|s| s.residuals.largest()),
+                column(|s| s.error.unwrap_or(f64::NAN)),
+            ],
         ))
     }
 
-    /// Spine positions of all states of a branch.
+    /// Spine positions of all states of a branch, at the nodes of the state with the most nodes.
     ///
     /// Shapes: (n, 3) each.
     fn positions<'py>(&self, py: Python<'py>, branch: usize) -> Vec<Points<'py>> {
-        let states = 0..self.0.branches[branch].states.len();
-        let positions = |state| {
-            let equilibrium = self.0.equilibrium(branch, state);
-            array::points(py, equilibrium.spine.pose.iter().map(|pose| &pose.position))
-        };
-        states.map(positions).collect()
+        let positions = py.detach(|| self.0.positions(branch));
+        positions
+            .iter()
+            .map(|points| array::points(py, points))
+            .collect()
     }
 
     /// The scenario and the equilibrium of a state.

@@ -86,7 +86,8 @@ pub fn branches(
     }
     census.perturb();
     census.promote(&fine);
-    census.confirm();
+    census.carry(problem);
+    census.confirm(problem);
     census.face();
     census.refine(problem, &plain);
     let mut found = census.found;
@@ -140,9 +141,20 @@ impl<'a> Census<'a> {
 
     /// Enters an equilibrium unless it is known or has too many negative modes; of mirror images the higher.
     fn enter(&mut self, equilibrium: Equilibrium) {
+        if equilibrium.status == Status::Converged {
+            self.enter_any(equilibrium);
+        }
+    }
+
+    /// As [`Self::enter`], an equilibrium of its mesh, be it one of the belt or not; of the first mesh only if it is one, as the
+    /// search goes on on a finer one.
+    fn enter_any(&mut self, equilibrium: Equilibrium) {
         let settings = self.settings;
-        if equilibrium.status != Status::Converged || index(&equilibrium) > settings.highest_index()
-        {
+        let may_enter = match self.problem.elements() > settings.coarse_elements {
+            true => equilibrium.is_of_its_mesh(),
+            false => equilibrium.status == Status::Converged,
+        };
+        if !may_enter || index(&equilibrium) > settings.highest_index() {
             return;
         }
         let same = self
@@ -199,7 +211,8 @@ impl<'a> Census<'a> {
             let (known, new) = self.found.split_at(known);
             let is_like =
                 |new: &Equilibrium| known.iter().any(|known| settings.is_like(known, new));
-            is_fruitful = !new.iter().all(is_like);
+            let mut of_belt = new.iter().filter(|e| e.status == Status::Converged);
+            is_fruitful = !of_belt.all(is_like);
             tried = next;
         }
     }
@@ -217,7 +230,7 @@ impl<'a> Census<'a> {
             for (way, equilibrium) in found {
                 self.trails.extend(way);
                 if let Some(equilibrium) = equilibrium {
-                    self.enter(equilibrium);
+                    self.enter_any(equilibrium);
                 }
             }
         }
@@ -288,14 +301,33 @@ impl<'a> Census<'a> {
             found.led_to(problem, &mut settings.budget(watch))
         });
         for equilibrium in led_to.into_iter().flatten() {
-            self.enter(equilibrium);
+            self.enter_any(equilibrium);
         }
         true
     }
 
+    /// Replaces the equilibria of this mesh alone, the lowest, by those to which they lead on meshes that follow the error, where
+    /// the problem asks for that.
+    fn carry(&mut self, asked: &Problem) {
+        let found = std::mem::take(&mut self.found);
+        let (of_belt, mut of_mesh): (Vec<_>, Vec<_>) = found
+            .into_iter()
+            .partition(|e| e.status == Status::Converged);
+        self.found = of_belt;
+        of_mesh.sort_by(|a, b| a.energy.total_cmp(&b.energy));
+        of_mesh.truncate(self.settings.carried);
+        let (settings, watch) = (self.settings, self.watch);
+        let carried = self.each(&of_mesh, |found| {
+            found.refined_for(asked, &mut settings.long_budget(watch))
+        });
+        for equilibrium in carried.into_iter().flatten() {
+            self.enter(equilibrium);
+        }
+    }
+
     /// Keeps the equilibria that are confirmed on a mesh twice as fine; of equilibria that this mesh does not separate the
-    /// lowest.
-    fn confirm(&mut self) {
+    /// lowest, unless they are refined further.
+    fn confirm(&mut self, asked: &Problem) {
         let mut found = std::mem::take(&mut self.found);
         found.sort_by(|a, b| a.energy.total_cmp(&b.energy));
         let (settings, watch) = (self.settings, self.watch);
@@ -308,9 +340,11 @@ impl<'a> Census<'a> {
                 continue;
             };
             let change = (fine.energy - found.energy).abs();
+            let is_final = asked.has_fixed_mesh() || index(&found) > 0;
             let is_known = |(known, own): &(Equilibrium, f64)| {
                 let is_level = (known.energy - fine.energy).abs() <= change.max(*own);
-                settings.is_same(known, &fine) || (is_level && settings.is_like(known, &fine))
+                settings.is_same(known, &fine)
+                    || (is_final && is_level && settings.is_like(known, &fine))
             };
             if !known.iter().any(is_known) {
                 known.push((fine, change));
@@ -320,15 +354,21 @@ impl<'a> Census<'a> {
     }
 
     /// Replaces the minima by those to which they lead on meshes that follow the error, where the problem asks for that; of
-    /// equilibria that these meshes do not separate the lowest. The result of a plain solve is among the equilibria.
+    /// equilibria that these meshes do not separate the lowest, of those that meet the accuracy first. The result of a plain solve is among the equilibria.
     fn refine(&mut self, asked: &Problem, plain: &Equilibrium) {
         let found = std::mem::take(&mut self.found);
         let (settings, watch) = (self.settings, self.watch);
         let mut refined = self.each(&found, |found| {
-            let refined = found.refined_for(asked, &mut settings.budget(watch));
+            let refined = found.refined_for(asked, &mut settings.long_budget(watch));
             refined.unwrap_or_else(|| found.clone())
         });
-        refined.sort_by(|a, b| a.energy.total_cmp(&b.energy));
+        let error = |e: &Equilibrium| e.error().map_or(f64::INFINITY, |error| error.energy);
+        let is_accurate = |e: &Equilibrium| error(e) <= asked.accuracy();
+        refined.sort_by(|a, b| {
+            is_accurate(b)
+                .cmp(&is_accurate(a))
+                .then(a.energy.total_cmp(&b.energy))
+        });
         self.enter(plain.clone());
         for equilibrium in refined {
             let is_known = |known: &Equilibrium| settings.is_unresolved(known, &equilibrium);
@@ -384,7 +424,8 @@ fn on_finer_mesh(
     found: &Equilibrium,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Option<Equilibrium> {
-    let fine = found.refined(settings.refinement * found.problem.elements(), proceed)?;
+    let elements = found.solved.as_ref()?.program.elements().count();
+    let fine = found.refined(settings.refinement * elements, proceed)?;
     let change = (fine.energy - found.energy).abs();
     let is_level = change <= settings.like_level * settings.size(found);
     (is_level && found.displacement(&fine) <= settings.like_distance).then_some(fine)

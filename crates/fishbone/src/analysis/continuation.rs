@@ -14,6 +14,7 @@ use crate::names::named;
 use crate::problem::program::BeltPoint;
 use crate::problem::{Mesh, Problem};
 use crate::surface;
+use nalgebra::Vector3;
 use stagewise::{Events, Pace, Residuals, Stationary};
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -54,6 +55,8 @@ impl From<stagewise::End<Stop>> for End {
             stagewise::End::Budget => Self::Budget,
             stagewise::End::Lost => Self::Lost,
             stagewise::End::Stopped(Stop::Edges) => Self::Edges,
+            // A branch is left on a mesh that does not carry it only for want of states.
+            stagewise::End::Stopped(Stop::Mesh) => Self::Budget,
             stagewise::End::Stopped(Stop::Interrupted) => Self::Interrupted,
         }
     }
@@ -221,6 +224,8 @@ pub struct Summary {
     pub status: Status,
     /// Largest residuals of the state's discrete equations.
     pub residuals: Residuals,
+    /// The largest estimated error by the mesh, relative; `None` where it is not known.
+    pub error: Option<f64>,
 }
 
 named! {
@@ -395,6 +400,32 @@ impl Diagram {
             stability: equilibrium.stability,
             status: equilibrium.status,
             residuals: equilibrium.residuals,
+            error: equilibrium.error().map(|error| error.largest()),
         }
+    }
+
+    /// The positions of the spine in all states of a branch, at the nodes of the state with the most nodes.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such branch.
+    pub fn positions(&self, branch: usize) -> Vec<Vec<Vector3<f64>>> {
+        let states = &self.branches[branch].states;
+        let most = states.iter().enumerate();
+        let most = most.max_by_key(|(_, state)| state.mesh.elements());
+        let Some((most, finest)) = most else {
+            return Vec::new();
+        };
+        let spine = self.equilibrium(branch, most).spine;
+        let shares: Vec<f64> = spine.u.iter().map(|u| u / spine.length()).collect();
+        let position = |(index, state): (usize, &State)| {
+            let spine = self.equilibrium(branch, index).spine;
+            if state.mesh == finest.mesh {
+                return spine.pose.iter().map(|pose| pose.position).collect();
+            }
+            let places = shares.iter().map(|share| share * spine.length());
+            places.map(|u| spine.at(u).pose.position).collect()
+        };
+        states.iter().enumerate().map(position).collect()
     }
 }

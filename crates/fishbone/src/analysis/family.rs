@@ -2,7 +2,9 @@
 
 use crate::analysis::path::Path;
 use crate::analysis::sensitivity::add_support_motion;
-use crate::equilibrium::{minimum_next_to_on, prolonged, prolonged_with_multipliers};
+use crate::equilibrium::{
+    carries, mesh_that_carries, minimum_next_to_on, prolonged, prolonged_with_multipliers,
+};
 use crate::problem::program::{BeltPoint, BeltProgram, rows_of};
 use crate::problem::{Mesh, Problem};
 use stagewise::{Continuation, Direction, Family, Pace, Program, Stationary, by_differences};
@@ -57,30 +59,51 @@ impl Along {
         Continuation::new(self, tolerance, ends, pace)
     }
 
-    /// The start of the same branch on the mesh of elements half as long, next to a station of this family, with the path on
-    /// that mesh: by Newton's method, or of a minimum by a search next to it.
-    pub(super) fn on_half_elements(
+    /// The start of the same branch on another mesh, next to a station of this family, with the path on that mesh: by Newton's
+    /// method, or of a minimum by a search next to it.
+    pub(super) fn on_mesh(
         &self,
+        mesh: Mesh,
         station: &Station,
         pace: Pace,
     ) -> Option<(Self, Station)> {
         let place = station.parameter;
-        let fine = self.on(self.mesh.halved());
-        let shape = self.shape_on(station, &fine)?;
-        let fine = fine.with_active_sets_for(place, &shape)?;
-        if let Some(start) = self.carried_over(station, &fine, pace) {
-            return Some((fine, start));
+        let other = self.on(mesh);
+        let shape = self.shape_on(station, &other)?;
+        let other = other.with_active_sets_for(place, &shape)?;
+        if let Some(start) = self.carried_over(station, &other, pace) {
+            return Some((other, start));
         }
         let is_minimum = station.negative == 0;
         let problem = self.path.at(place).filter(|_| is_minimum)?;
         let proceed = &mut || ControlFlow::Continue(());
-        let found = minimum_next_to_on(&problem, &fine.mesh, &shape, proceed);
+        let found = minimum_next_to_on(&problem, &other.mesh, &shape, proceed);
         let solved = found.certified().ok()?;
-        let fine = self.on(Mesh::of(&problem, &solved.program));
-        let start = fine
+        let other = self.on(Mesh::of(&problem, &solved.program));
+        let start = other
             .continuation(pace)
             .start(&solved.at, place, station.is_rising())?;
-        Some((fine, start))
+        Some((other, start))
+    }
+
+    /// Whether the mesh carries a station.
+    pub(super) fn carries(&self, station: &Station) -> bool {
+        self.meshed(station.parameter)
+            .is_some_and(|(problem, program)| {
+                carries(&problem, &program, &station.at, station.objective)
+            })
+    }
+
+    /// The same branch on a mesh that should carry a station beyond, next to another station of this family.
+    pub(super) fn on_mesh_that_carries(
+        &self,
+        beyond: &Station,
+        station: &Station,
+        pace: Pace,
+    ) -> Option<(Self, Station)> {
+        let (problem, program) = self.meshed(beyond.parameter)?;
+        let mesh = mesh_that_carries(&problem, &program, &beyond.at)?;
+        self.on_mesh(mesh, station, pace)
     }
 
     /// The shape of a station on another mesh.

@@ -9,7 +9,7 @@ use crate::strip::element::Element;
 use crate::strip::spine::Spine;
 use crate::surface::least_spine_radius;
 use nalgebra::Vector3;
-use stagewise::{Distance, Outcome, Solution, Stationary, Values};
+use stagewise::{Distance, Outcome, Solution, Stationary};
 use std::ops::ControlFlow;
 
 /// Estimated errors of a result by its mesh, relative and not negative; NaN where a quantity is not determined, or so small
@@ -29,7 +29,7 @@ pub struct MeshError {
 
 impl MeshError {
     /// The largest of the errors.
-    pub(super) fn largest(&self) -> f64 {
+    pub(crate) fn largest(&self) -> f64 {
         self.worst().1
     }
 
@@ -94,31 +94,29 @@ impl Estimate {
         problem: &Problem,
         program: &BeltProgram,
         at: &Stationary<BeltPoint>,
-        values: &Values,
+        objective: f64,
         is_last: bool,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Option<Self> {
         let mesh = Mesh::of(problem, program);
-        let fine = problem.program_on(&mesh.halved())?;
-        // On an arc, ribs that nearly meet in an element meet in one of its halves.
-        let here = prolonged(program, &at.point, &fine);
-        let ribs_meet = fine.least_slack(&here) <= 0.0;
-        let near = prolonged_with_multipliers(program, at, &fine);
-        let own = Quantities::of(
-            problem,
-            program,
-            &at.point,
-            &at.multipliers.equalities,
-            values.objective,
-        );
-        if fine.is_at_rest(&near.point) {
-            let same = (near.point, near.multipliers.equalities, 0.0);
-            let error = own.off_on(problem, &fine, &same);
+        let halved = Halved::of(problem, program, at, objective)?;
+        if halved.fine.is_at_rest(&halved.near.point) {
+            let error = halved.error_at_rest(problem);
             return Some(Self::at_rest(error, program.elements().count()));
         }
-        let step = stagewise::correct(&fine, tolerance(problem), near.clone())?;
-        let mut better = (step.point, step.equalities, step.objective);
-        let mut error = own.off_on(problem, &fine, &better);
+        let Step {
+            mut better,
+            mut error,
+            gains,
+        } = halved.step(problem)?;
+        let Halved {
+            fine,
+            here,
+            near,
+            own,
+        } = halved;
+        // On an arc, ribs that nearly meet in an element meet in one of its halves.
+        let ribs_meet = fine.least_slack(&here) <= 0.0;
         // A density that does not know the width lets ribs turn over anywhere at no cost, and elements much longer than the
         // width hold ribs wherever they turn: one step does not move the place from element to element.
         let is_accurate = error.largest() <= problem.accuracy();
@@ -167,7 +165,7 @@ impl Estimate {
             error: error.times(Self::OVER_CHANGE),
             gains: middles
                 .clone()
-                .map(|middle| step.gains[middle].max(f64::MIN_POSITIVE))
+                .map(|middle| gains[middle].max(f64::MIN_POSITIVE))
                 .collect(),
             curvatures: middles.map(in_element).collect(),
         })
@@ -180,6 +178,76 @@ impl Estimate {
             gains: vec![f64::MIN_POSITIVE; elements],
             curvatures: vec![[0.0; 2]; elements],
         }
+    }
+}
+
+/// The largest error of a stationary point of a problem's programme that one Newton step on the finer mesh tells; infinite
+/// where there is no such step.
+pub(super) fn largest_error_by_a_step(
+    problem: &Problem,
+    program: &BeltProgram,
+    at: &Stationary<BeltPoint>,
+    objective: f64,
+) -> f64 {
+    let step = || Halved::of(problem, program, at, objective)?.step(problem);
+    step().map_or(f64::INFINITY, |step| {
+        step.error.times(Estimate::OVER_CHANGE).largest()
+    })
+}
+
+/// A stationary point of a programme, prolonged to the mesh of elements half as long.
+struct Halved {
+    /// The programme on that mesh.
+    fine: BeltProgram,
+    /// The point as it is, perhaps with ribs that meet.
+    here: BeltPoint,
+    /// The point with its ribs apart, and its multipliers.
+    near: Stationary<BeltPoint>,
+    /// The quantities of the point on its own mesh.
+    own: Quantities,
+}
+
+/// A Newton step from a point on its own mesh towards the equilibrium of the finer one.
+struct Step {
+    /// Point, multipliers of its equations and objective after the step.
+    better: (BeltPoint, Vec<f64>, f64),
+    /// By how much the point before the step is off.
+    error: MeshError,
+    /// By how much the step lowers the energy at each node of the finer mesh, in mean R_f/U.
+    gains: Vec<f64>,
+}
+
+impl Halved {
+    fn of(
+        problem: &Problem,
+        program: &BeltProgram,
+        at: &Stationary<BeltPoint>,
+        objective: f64,
+    ) -> Option<Self> {
+        let fine = problem.program_on(&Mesh::of(problem, program).halved())?;
+        let equalities = &at.multipliers.equalities;
+        Some(Self {
+            here: prolonged(program, &at.point, &fine),
+            near: prolonged_with_multipliers(program, at, &fine),
+            own: Quantities::of(problem, program, &at.point, equalities, objective),
+            fine,
+        })
+    }
+
+    fn error_at_rest(&self, problem: &Problem) -> MeshError {
+        let Stationary { point, multipliers } = self.near.clone();
+        let same = (point, multipliers.equalities, 0.0);
+        self.own.off_on(problem, &self.fine, &same)
+    }
+
+    fn step(&self, problem: &Problem) -> Option<Step> {
+        let step = stagewise::correct(&self.fine, tolerance(problem), self.near.clone())?;
+        let better = (step.point, step.equalities, step.objective);
+        Some(Step {
+            error: self.own.off_on(problem, &self.fine, &better),
+            better,
+            gains: step.gains,
+        })
     }
 }
 

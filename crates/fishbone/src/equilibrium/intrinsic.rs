@@ -56,11 +56,7 @@ pub(crate) fn of_solution(
 ) -> Equilibrium {
     let redundant = redundant(problem, &program);
     let fault = problem.active_set_fault(&program, &solution.at.point);
-    let found = Found {
-        program,
-        solution,
-        error: OnceLock::new(),
-    };
+    let found = Found::unestimated(program, solution);
     let (status, message) = judge(problem, &found, fault, redundant.as_deref());
     equilibrium(problem, found, status, message, redundant)
 }
@@ -71,6 +67,7 @@ fn equilibrium(
     Found {
         program,
         solution,
+        is_of_mesh_alone,
         error,
     }: Found,
     status: Status,
@@ -120,6 +117,7 @@ fn equilibrium(
             inertia: solution.inertia,
             redundant,
             is_flat,
+            is_of_mesh_alone,
         }),
     }
 }
@@ -128,6 +126,8 @@ fn equilibrium(
 struct Found {
     program: BeltProgram,
     solution: Solution<BeltPoint>,
+    /// Whether this is an equilibrium, but not of the belt, because elements turn too far.
+    is_of_mesh_alone: bool,
     /// The error by the mesh, where it has been estimated.
     error: OnceLock<Option<MeshError>>,
 }
@@ -136,13 +136,25 @@ impl Found {
     /// The end of a search on a mesh, with the fault that keeps its result from being relied on.
     fn of(problem: &Problem, level: Level) -> (Self, Option<String>) {
         let fault = level.fault(problem);
+        let is_of_mesh_alone = level.has_converged() && fault.is_some();
         let error = level.estimate.map(|estimate| Some(estimate.error));
         let found = Self {
             program: level.program,
             solution: level.solution,
+            is_of_mesh_alone,
             error: error.map_or_else(OnceLock::new, OnceLock::from),
         };
         (found, fault)
+    }
+
+    /// A solution of a programme whose error has not been estimated.
+    fn unestimated(program: BeltProgram, solution: Solution<BeltPoint>) -> Self {
+        Self {
+            program,
+            solution,
+            is_of_mesh_alone: false,
+            error: OnceLock::new(),
+        }
     }
 }
 
@@ -160,11 +172,7 @@ impl Search {
 fn start(problem: &Problem) -> Found {
     let program = problem.program(problem.elements());
     let solution = Search::of(problem).start(&program);
-    Found {
-        program,
-        solution,
-        error: OnceLock::new(),
-    }
+    Found::unestimated(program, solution)
 }
 
 /// The end of a search, with the fault of the active sets of the shape found, if there is one.

@@ -37,6 +37,7 @@ use thiserror::Error;
 
 pub(crate) use intrinsic::of_solution;
 pub(crate) use lifted::flat_pose;
+pub(crate) use refinement::{carries, mesh_that_carries};
 pub(crate) use search::{prolonged, prolonged_with_multipliers};
 
 named! {
@@ -145,6 +146,8 @@ pub(crate) struct Solved {
     pub(crate) redundant: Option<String>,
     /// Whether a part of the belt has stayed flat under load.
     pub(crate) is_flat: bool,
+    /// Whether this is an equilibrium of its mesh, and of the belt perhaps on a finer one: elements turn too far.
+    pub(crate) is_of_mesh_alone: bool,
 }
 
 impl Equilibrium {
@@ -172,7 +175,7 @@ impl Equilibrium {
                 &self.problem,
                 &solved.program,
                 &solved.at,
-                &solved.values,
+                solved.values.objective,
                 true,
                 &mut || ControlFlow::Continue(()),
             );
@@ -194,6 +197,12 @@ impl Equilibrium {
                 message: self.message.clone(),
             }),
         }
+    }
+
+    /// Whether this is an equilibrium of its mesh, be it one of the belt or not.
+    pub(crate) fn is_of_its_mesh(&self) -> bool {
+        let is_of_mesh_alone = self.solved.as_ref().is_some_and(|s| s.is_of_mesh_alone);
+        self.status == Status::Converged || is_of_mesh_alone
     }
 
     /// Whether the solve has converged, to a minimum as far as is known.
@@ -262,11 +271,12 @@ impl Equilibrium {
         const NEAR: f64 = 0.05;
         let problem = self.problem.with_elements(elements).ok()?;
         let found = self.led_to(&problem, proceed)?;
-        (self.displacement(&found) <= NEAR).then_some(found)
+        let is_same = found.status == Status::Converged && self.displacement(&found) <= NEAR;
+        is_same.then_some(found)
     }
 
-    /// The equilibrium, minimum or not, to which this one leads on the uniform mesh of another problem of the same belt;
-    /// `None` if it leads to none.
+    /// The equilibrium, minimum or not, to which this one leads on the uniform mesh of another problem of the same belt, be it
+    /// one of that mesh alone; `None` if it leads to none.
     pub(crate) fn led_to(
         &self,
         problem: &Problem,
@@ -309,7 +319,7 @@ impl Equilibrium {
         let mut from = |start| {
             let found = intrinsic::solve(problem, start, proceed);
             let displacement = self.displacement(&found);
-            (found.status == Status::Converged).then_some((displacement, found))
+            found.is_of_its_mesh().then_some((displacement, found))
         };
         let close = from(Start::Close(&mesh, shape));
         let nearest = match close {

@@ -2,7 +2,7 @@
 
 mod slender;
 
-use super::accuracy::Estimate;
+use super::accuracy::{Estimate, largest_error_by_a_step};
 use super::active_set::settle;
 use super::search::{Search, prolong, prolonged};
 use crate::problem::program::{BeltPoint, BeltProgram};
@@ -13,7 +13,7 @@ use slender::narrowed;
 pub(super) use slender::{
     PER_WIDTH, is_slender, mesh_about_ribs, mesh_for_ribs_anywhere, ribs_turn, widened,
 };
-use stagewise::{Distance, Outcome, Solution};
+use stagewise::{Distance, Outcome, Solution, Stationary};
 use std::ops::ControlFlow;
 
 /// Elements of the first mesh, a number.
@@ -121,7 +121,7 @@ pub(super) fn refine(
         let in_vain = best
             .as_ref()
             .is_some_and(|best| level.is_in_vain_after(best));
-        mesh = level.better_mesh(problem);
+        mesh = level.better_mesh(problem, problem.accuracy());
         best = match best {
             Some(best) if best.estimate.is_some() && !level.is_better_than(&best) => Some(best),
             _ => Some(level),
@@ -210,6 +210,56 @@ fn first_mesh(problem: &Problem) -> Mesh {
     let lengths: Vec<f64> = program.elements().map(|(_, e)| e.length).collect();
     let places: Vec<_> = places.collect();
     Mesh::uniform(problem, FIRST).graded(problem, &lengths, &places)
+}
+
+/// Whether a mesh that follows the error carries a stationary point of a problem's programme well enough to be followed on it, as
+/// far as one Newton step on the mesh of elements half as long tells; a mesh that the scenario fixes carries all.
+///
+/// Every mesh is another discrete belt: the fewer the changes, the smoother the path.
+pub(crate) fn carries(
+    problem: &Problem,
+    program: &BeltProgram,
+    at: &Stationary<BeltPoint>,
+    objective: f64,
+) -> bool {
+    /// Error from which a belt goes on on another mesh, over the accuracy, dimensionless; and where its ribs may turn anywhere.
+    const TOO_LARGE: [f64; 2] = [10.0, 50.0];
+    let most = || TOO_LARGE[usize::from(may_turn_anywhere(program, &at.point))];
+    has_no_better_mesh(problem)
+        || largest_error_by_a_step(problem, program, at, objective) <= most() * problem.accuracy()
+}
+
+/// A mesh that should carry a stationary point of a problem's programme; `None` where there is none, or none of few elements.
+pub(crate) fn mesh_that_carries(
+    problem: &Problem,
+    program: &BeltProgram,
+    at: &Stationary<BeltPoint>,
+) -> Option<Mesh> {
+    /// Greatest number of elements of a mesh on which a belt is followed.
+    const MOST: usize = 3000;
+    /// Error that is aimed at, over the accuracy, dimensionless; and where ribs may turn anywhere.
+    const AIM: [f64; 2] = [1.0, 10.0];
+    if has_no_better_mesh(problem) {
+        return None;
+    }
+    let solution = stagewise::assess(program, problem.tolerance(), at);
+    let mut level = Level::new(program.clone(), solution, None);
+    level.estimate(problem, false, &mut || ControlFlow::Continue(()));
+    let aim = AIM[usize::from(may_turn_anywhere(program, &at.point))];
+    let mesh = level.better_mesh(problem, aim * problem.accuracy());
+    (mesh.elements() <= MOST).then_some(mesh)
+}
+
+/// Whether ribs turn with a density that does not know the width: they turn from element to element as the belt is led, the more
+/// often the finer these are.
+fn may_turn_anywhere(program: &BeltProgram, at: &BeltPoint) -> bool {
+    let mut elements = program.elements();
+    !program.model.knows_width() && elements.any(|element| ribs_turn(at, element))
+}
+
+/// Whether the mesh is fixed, by the scenario or because a belt that slides along itself has no place on a graded one.
+fn has_no_better_mesh(problem: &Problem) -> bool {
+    problem.has_fixed_mesh() || problem.is_left_alone()
 }
 
 impl Level {
@@ -342,8 +392,8 @@ impl Level {
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) {
         if self.has_converged() {
-            let (at, values) = (&self.solution.at, &self.solution.values);
-            self.estimate = Estimate::new(problem, &self.program, at, values, is_last, proceed);
+            let (at, objective) = (&self.solution.at, self.solution.values.objective);
+            self.estimate = Estimate::new(problem, &self.program, at, objective, is_last, proceed);
         }
     }
 
@@ -363,7 +413,8 @@ impl Level {
         self.misfit.clone().or(turned)
     }
 
-    fn has_converged(&self) -> bool {
+    /// Whether the solution is an equilibrium of its mesh, with the right active sets.
+    pub(super) fn has_converged(&self) -> bool {
         self.solution.outcome == Outcome::Converged && self.misfit.is_none()
     }
 
@@ -442,11 +493,11 @@ impl Level {
 
     /// A mesh on which the error should be within the accuracy. A belt that may slide along itself has no place on a graded
     /// mesh: there the elements are halved.
-    fn better_mesh(&self, problem: &Problem) -> Mesh {
+    fn better_mesh(&self, problem: &Problem, accuracy: f64) -> Mesh {
         let mesh = Mesh::of(problem, &self.program);
         match &self.estimate {
             Some(estimate) if self.is_sound() && !problem.is_left_alone() => {
-                mesh.graded(problem, &self.lengths(estimate, problem.accuracy()), &[])
+                mesh.graded(problem, &self.lengths(estimate, accuracy), &[])
             }
             _ => mesh.halved(),
         }

@@ -17,8 +17,10 @@ pub struct SearchSettings {
     /// Highest barrier at which a search may be known by the shape that it passes, in mean R_f/U: higher ones make shapes
     /// alike that go different ways afterwards.
     pub highest_barrier: f64,
-    /// Greatest count of iterations of a search for a minimum, a number.
+    /// Greatest count of iterations of a search for a minimum on one mesh, a number.
     pub iterations: usize,
+    /// Greatest count of iterations of a search for the same minimum on meshes that follow the error, a number.
+    pub refining_iterations: usize,
     /// Waves of bend, laid over every arch and the straight belt; amplitudes in 1/U.
     pub bend_waves: Vec<Wave>,
     /// Waves of rib slope, each laid over with every wave of bend; amplitudes, a number.
@@ -30,6 +32,8 @@ pub struct SearchSettings {
     pub batch: usize,
     /// Searches for minima at a time, a number: each of them ends where it comes to the way of one of those before.
     pub searches_at_a_time: usize,
+    /// Greatest count of equilibria of a mesh alone that are carried over to finer ones, the lowest in energy, a number.
+    pub carried: usize,
     /// Greatest count of perturbed minima, a number.
     pub perturbed: usize,
     /// Modes along which a minimum is perturbed, a number.
@@ -86,6 +90,7 @@ impl Default for SearchSettings {
             elements: 80,
             highest_barrier: 0.1,
             iterations: 200,
+            refining_iterations: 1000,
             bend_waves: waves(&[
                 (0.0, 0.0),
                 (0.0, 4.0),
@@ -101,6 +106,7 @@ impl Default for SearchSettings {
             sums: 2048,
             batch: 160,
             searches_at_a_time: 32,
+            carried: 32,
             perturbed: 32,
             perturbed_modes: 4,
             perturbations: vec![0.1, -0.1, 0.3, -0.3],
@@ -121,16 +127,14 @@ impl Default for SearchSettings {
 }
 
 impl SearchSettings {
-    /// Whether to go on with a search for a minimum, asked once an iteration.
+    /// Whether to go on with a search for a minimum on one mesh, asked once an iteration.
     pub(super) fn budget(&self, watch: &dyn Watch) -> impl FnMut() -> ControlFlow<()> {
-        let mut left = self.iterations;
-        move || match left.checked_sub(1) {
-            Some(less) => {
-                left = less;
-                watch.proceed()
-            }
-            None => ControlFlow::Break(()),
-        }
+        at_most(self.iterations, watch)
+    }
+
+    /// Whether to go on with a search for the same minimum on meshes that follow the error, asked once an iteration.
+    pub(super) fn long_budget(&self, watch: &dyn Watch) -> impl FnMut() -> ControlFlow<()> {
+        at_most(self.refining_iterations, watch)
     }
 
     /// Greatest number of negative modes of a reported equilibrium.
@@ -192,6 +196,18 @@ impl SearchSettings {
     /// Whether the first of two mirror images bulges more along `solver.bulge`.
     pub(super) fn is_higher(&self, one: &Equilibrium, other: &Equilibrium) -> bool {
         height(one) > height(other) + self.higher * one.spine.length()
+    }
+}
+
+/// Whether to go on with a search of no more than some iterations, asked once an iteration.
+fn at_most(iterations: usize, watch: &dyn Watch) -> impl FnMut() -> ControlFlow<()> {
+    let mut left = iterations;
+    move || match left.checked_sub(1) {
+        Some(less) => {
+            left = less;
+            watch.proceed()
+        }
+        None => ControlFlow::Break(()),
     }
 }
 

@@ -60,8 +60,8 @@ struct Sum {
 }
 
 impl Sum {
-    /// The i-th of a sequence that covers all sums evenly: bends of one to four times that of a ring and slopes up to 1.5, root
-    /// mean square. Starts that bend less lead to the same few minima over and over.
+    /// The i-th of a sequence that covers all sums evenly: bends up to four times that of a ring and slopes up to 1.5, root mean
+    /// square.
     ///
     /// Source: M. Roberts, "The unreasonable effectiveness of quasirandom sequences" (2018).
     fn new(i: usize) -> Self {
@@ -77,7 +77,7 @@ impl Sum {
             ratio /= root;
             (0.5 + (i as f64 + 1.0) * ratio).fract()
         };
-        let sizes = [2.0 * PI * (1.0 + 3.0 * next()), 1.5 * next()];
+        let sizes = [8.0 * PI * next(), 1.5 * next()];
         let waves = sizes.map(|size| {
             let mut waves = [(0.0, 0.0); WAVES];
             for wave in &mut waves {

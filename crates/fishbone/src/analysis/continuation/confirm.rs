@@ -34,7 +34,7 @@ pub(super) fn is_confirmed(
     let far = far.step_by(STARTS[1]).take(STARTS[0]);
     let mut starts = far.chain(stations.first());
     let Some((onwards, fine, start)) = starts.find_map(|before| {
-        let (fine, start) = family.on_half_elements(before, pace)?;
+        let (fine, start) = family.on_mesh(family.mesh.halved(), before, pace)?;
         Some((-off(before).signum(), fine, start))
     }) else {
         return false;

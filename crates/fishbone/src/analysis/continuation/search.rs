@@ -4,8 +4,9 @@ use super::confirm::is_confirmed;
 use super::trace::{Crossing, Stretch, trace};
 use super::{Branch, CrossingSettings, Diagram, End, Event, Kind, Origin, Snapped, State};
 use crate::analysis::family::{Along, Station};
-use crate::analysis::symmetry::{SAME, are_images};
+use crate::analysis::symmetry::{SAME, are_images, sampled};
 use crate::equilibrium::{Equilibrium, of_solution, snapped_from, solve_near};
+use crate::geometry::Pose;
 use crate::problem::Mesh;
 use stagewise::{Distance, Events, Family, Pace, Turn};
 use std::ops::ControlFlow;
@@ -59,7 +60,7 @@ impl Search<'_> {
         }
         let mut first = 0;
         for (place, stretch) in stretches.iter().enumerate() {
-            if place > 0 {
+            if place > 0 && stretch.has_other_edges {
                 self.add_switch(index, first, stretch);
             }
             for (state, event) in &stretch.events {
@@ -105,11 +106,13 @@ impl Search<'_> {
         // The belt passes over a fold that is smaller than a snap.
         let landed = landed.filter(|_| event.turn == Turn::Fold && !is_snap);
         let landed = landed.and_then(|landed| self.start_at(&landed, event, stretch));
-        if let Some((family, start)) = landed.filter(|(_, start)| self.may_follow(start)) {
+        if let Some((family, start)) =
+            landed.filter(|(family, start)| self.may_follow(family, start))
+        {
             self.trace(Some(origin), &family, start);
         }
         for side in self.different(crossing) {
-            if !self.may_follow(&side) {
+            if !self.may_follow(&stretch.family, &side) {
                 continue;
             }
             for rising in self.ways(event, &side) {
@@ -176,7 +179,7 @@ impl Search<'_> {
                 let branch = &mut self.diagram.branches[index];
                 branch.states.extend(states(stretch));
                 branch.end = End::from(end);
-                if place > 0 {
+                if place > 0 && stretch.has_other_edges {
                     self.add_switch(index, state, stretch);
                 }
                 state += stretch.stations.len();
@@ -273,9 +276,10 @@ impl Search<'_> {
         Some((family, start))
     }
 
-    /// Whether a branch from a station is new and not one too many.
-    fn may_follow(&self, station: &Station) -> bool {
-        !self.is_known(station) && self.diagram.branches.len() < self.diagram.settings.branches
+    /// Whether a branch from a station of a family is new and not one too many.
+    fn may_follow(&self, family: &Along, station: &Station) -> bool {
+        !self.is_known(family, station)
+            && self.diagram.branches.len() < self.diagram.settings.branches
     }
 
     /// The stations of other branches that cross at an event, a little before it or beyond.
@@ -350,12 +354,12 @@ impl Search<'_> {
         }
     }
 
-    /// Whether one of the branches passes through a station, by straight lines between their states.
-    fn is_known(&self, station: &Station) -> bool {
+    /// Whether one of the branches passes through a station of a family, by straight lines between their states.
+    fn is_known(&self, family: &Along, station: &Station) -> bool {
         let settings = &self.diagram.settings.crossings;
         self.diagram.branches.iter().any(|branch| {
             let mut pairs = branch.states.windows(2);
-            pairs.any(|pair| lies_between(station, [&pair[0], &pair[1]], settings))
+            pairs.any(|pair| lies_between(family, station, [&pair[0], &pair[1]], settings))
         })
     }
 
@@ -479,26 +483,36 @@ fn kind(event: &Crossing, crossing: &[Station]) -> Kind {
     }
 }
 
-/// Whether a station lies between two states of a branch.
-fn lies_between(station: &Station, [a, b]: [&State; 2], settings: &CrossingSettings) -> bool {
+/// Whether a station of a family lies between two states of a branch.
+fn lies_between(
+    family: &Along,
+    station: &Station,
+    [a, b]: [&State; 2],
+    settings: &CrossingSettings,
+) -> bool {
     let share = (station.parameter - a.place) / (b.place - a.place);
-    let point = |state: &State| {
-        state
-            .at
-            .point
-            .poses
-            .iter()
-            .map(|pose| pose.position)
-            .collect::<Vec<_>>()
-    };
     let is_as_stable = [a, b].map(|state| state.negative_modes == station.negative);
     (0.0..=1.0).contains(&share) && is_as_stable.contains(&true) && {
-        let between = point(a)
-            .into_iter()
-            .zip(point(b))
-            .zip(&station.at.point.poses);
+        let Some(nodes) = family.at(station.parameter).map(|program| program.nodes()) else {
+            return false;
+        };
+        let [Some(from), Some(to)] = [a, b].map(|state| poses_at(family, state, &nodes)) else {
+            return false;
+        };
+        let ends = || from.iter().zip(&to).map(|(a, b)| (a.position, b.position));
+        let between = ends().zip(&station.at.point.poses);
         let off = between.map(|((a, b), pose)| (pose.position - a.lerp(&b, share)).norm());
-        let sag = settings.sag * a.at.point.distance(&b.at.point);
-        off.fold(0.0, f64::max) < settings.on_branch + sag
+        let moved = ends().map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+        off.fold(0.0, f64::max) < settings.on_branch + settings.sag * moved
     }
+}
+
+/// The poses of a state at places of the spine, arc lengths in U; `None` where the state's mesh is none of the family's path.
+fn poses_at(family: &Along, state: &State, places: &[f64]) -> Option<Vec<Pose>> {
+    let poses = &state.at.point.poses;
+    if *state.mesh == family.mesh {
+        return Some(poses.clone());
+    }
+    let own = family.on((*state.mesh).clone()).at(state.place)?;
+    Some(sampled(poses, &own.nodes(), places))
 }

@@ -1,5 +1,5 @@
-//! A branch on one mesh: a curve, which goes on over leg after leg of the path, and with other active edges wherever the ribs
-//! come to other edges.
+//! A branch: a curve, which goes on over leg after leg of the path, with other active edges wherever the ribs come to other
+//! edges, and on another mesh wherever its own carries the shape no more.
 
 use crate::analysis::family::{Along, Station};
 use crate::problem::program::BeltPoint;
@@ -12,18 +12,27 @@ pub(super) type Crossing = stagewise::Event<BeltPoint, 8>;
 /// Largest displacement of a node on a switch to other active edges, in U: beyond, the switch leads to another branch.
 const SAME_SHAPE: f64 = 1e-3;
 
+/// Greatest number of meshes of a branch but for the first.
+const MESHES: usize = 40;
+/// Displacement of a node on the way to another mesh beyond which it leads to another branch, in U.
+const SAME_BELT: f64 = 1e-2;
+
 /// Why a stretch ends, for a reason of this crate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Stop {
     /// The ribs have come to other edges.
     Edges,
+    /// The mesh does not carry the shape.
+    Mesh,
     /// The caller asked to end.
     Interrupted,
 }
 
-/// A part of a branch on one active set of edges.
+/// A part of a branch on one mesh with one active set of edges.
 pub(super) struct Stretch {
     pub(super) family: Along,
+    /// Whether the ribs have come to other edges at its start.
+    pub(super) has_other_edges: bool,
     /// Stations in order, those of events included.
     pub(super) stations: Vec<Station>,
     /// Events in order, each with its index among the stations.
@@ -39,23 +48,30 @@ pub(super) fn trace(
     proceed: &mut dyn FnMut(&Station) -> ControlFlow<()>,
 ) -> (Vec<Stretch>, End<Stop>) {
     let mut stretches: Vec<Stretch> = Vec::new();
-    let (begun_on, first) = (&family.mesh, start.clone());
+    let mut begun = (family.clone(), start.clone());
     let (mut family, mut start) = (family.clone(), start);
+    let mut has_other_edges = false;
+    let mut meshes = MESHES;
     let mut left = pace.stations;
     loop {
         let pace = Pace {
             stations: left,
             ..pace
         };
-        let is_back = !stretches.is_empty() && family.mesh == *begun_on;
-        let first = is_back.then_some(&first);
+        let own = start.parameter;
+        let is_back = !stretches.is_empty() && family.mesh == begun.0.mesh;
+        let first = (is_back && own != begun.1.parameter).then_some(&begun.1);
+        let is_watched = meshes > 0;
         let curve = curve_over_legs(&family, start, first, pace, &mut |station| {
             if proceed(station).is_break() {
                 return ControlFlow::Break(Stop::Interrupted);
             }
-            match family.holds(station) {
-                true => ControlFlow::Continue(()),
-                false => ControlFlow::Break(Stop::Edges),
+            if !family.holds(station) {
+                return ControlFlow::Break(Stop::Edges);
+            }
+            match is_watched && station.parameter != own && !family.carries(station) {
+                true => ControlFlow::Break(Stop::Mesh),
+                false => ControlFlow::Continue(()),
             }
         });
         let (mut stations, mut events) = (curve.stations, curve.events);
@@ -63,24 +79,52 @@ pub(super) fn trace(
         while stations.last().is_some_and(|last| !family.holds(last)) {
             beyond = stations.pop();
         }
+        let is_uncarried = beyond.is_none() && curve.end == End::Stopped(Stop::Mesh);
+        if is_uncarried && stations.len() > 1 {
+            beyond = stations.pop();
+        }
         events.retain(|(state, _)| *state < stations.len());
+        let mut next = None;
+        if let (Some(last), Some(beyond)) = (stations.last(), &beyond) {
+            next = match is_uncarried {
+                true => regraded(&family, last, beyond, pace),
+                false => switched(&family, last, beyond, pace),
+            };
+        }
+        match (&next, &beyond) {
+            (Some((other, _)), _) if is_uncarried => {
+                meshes -= 1;
+                let again = begun.0.on_mesh(other.mesh.clone(), &begun.1, pace);
+                begun = again.unwrap_or(begun);
+                // The same state is the first on the other mesh.
+                let has_event = events
+                    .last()
+                    .is_some_and(|(state, _)| state + 1 == stations.len());
+                if stations.len() > 1 && !has_event {
+                    stations.pop();
+                }
+            }
+            (None, Some(beyond)) if is_uncarried => {
+                meshes = 0;
+                next = Some((family.clone(), beyond.clone()));
+            }
+            _ => (),
+        }
         left -= stations.len();
-        let next = match (stations.last(), &beyond) {
-            (Some(last), Some(beyond)) if left > 1 => switched(&family, last, beyond, pace),
-            _ => None,
-        };
         let end = match beyond {
-            Some(_) => End::Stopped(Stop::Edges),
-            None => curve.end,
+            Some(_) if !is_uncarried => End::Stopped(Stop::Edges),
+            _ => curve.end,
         };
         if !stations.is_empty() {
             stretches.push(Stretch {
                 family: family.clone(),
+                has_other_edges,
                 stations,
                 events,
             });
         }
-        match next {
+        has_other_edges = !is_uncarried;
+        match next.filter(|_| left > 1) {
             Some(next) => (family, start) = next,
             None => return (stretches, end),
         }
@@ -153,4 +197,17 @@ fn switched(
         let is_here = near.at.point.distance(&last.at.point) <= SAME_SHAPE;
         (is_here && other.holds(&near)).then_some((other, near))
     })
+}
+
+/// The branch on a mesh that carries the station beyond, next to the last station that its own mesh carries.
+fn regraded(
+    family: &Along,
+    last: &Station,
+    beyond: &Station,
+    pace: Pace,
+) -> Option<(Along, Station)> {
+    let (other, start) = family.on_mesh_that_carries(beyond, last, pace)?;
+    let here = family.shape_on(last, &other)?;
+    let is_here = start.at.point.distance(&here) <= SAME_BELT;
+    (is_here && start.negative == last.negative).then_some((other, start))
 }
