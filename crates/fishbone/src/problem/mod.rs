@@ -120,7 +120,11 @@ impl Problem {
     ///
     /// [`ScenarioError`] where there is no such support, and where it may not be held at the pose: a frame that is no
     /// rotation, a position that is not finite or too many lengths of the belt away.
-    pub(crate) fn with_support_pose(&self, support: usize, pose: &Pose) -> Result<Self, ScenarioError> {
+    pub(crate) fn with_support_pose(
+        &self,
+        support: usize,
+        pose: &Pose,
+    ) -> Result<Self, ScenarioError> {
         let moved = self.moved(support, pose)?;
         let mut scenario = Scenario::clone(&self.scenario);
         scenario.supports[support] = moved;

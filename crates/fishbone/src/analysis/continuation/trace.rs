@@ -48,32 +48,42 @@ pub(super) fn trace(
     proceed: &mut dyn FnMut(&Station) -> ControlFlow<()>,
 ) -> (Vec<Stretch>, End<Stop>) {
     let mut stretches: Vec<Stretch> = Vec::new();
-    let mut begun = (family.clone(), start.clone());
+    let mut meshes = Meshes {
+        begun: (family.clone(), start.clone()),
+        left: MESHES,
+        unwatched: 1,
+    };
     let (mut family, mut start) = (family.clone(), start);
     let mut has_other_edges = false;
-    let mut meshes = MESHES;
     let mut left = pace.stations;
     loop {
         let pace = Pace {
             stations: left,
             ..pace
         };
-        let own = start.parameter;
-        let is_back = !stretches.is_empty() && family.mesh == begun.0.mesh;
-        let first = (is_back && own != begun.1.parameter).then_some(&begun.1);
-        let is_watched = meshes > 0;
-        let curve = curve_over_legs(&family, start, first, pace, &mut |station| {
-            if proceed(station).is_break() {
-                return ControlFlow::Break(Stop::Interrupted);
-            }
-            if !family.holds(station) {
-                return ControlFlow::Break(Stop::Edges);
-            }
-            match is_watched && station.parameter != own && !family.carries(station) {
-                true => ControlFlow::Break(Stop::Mesh),
-                false => ControlFlow::Continue(()),
-            }
-        });
+        let (begun_on, first) = &meshes.begun;
+        let is_back = !stretches.is_empty() && family.mesh == begun_on.mesh;
+        let may_close = is_back && start.parameter != first.parameter;
+        let mut passed = 0;
+        let curve = curve_over_legs(
+            &family,
+            start,
+            may_close.then_some(first),
+            pace,
+            &mut |station| {
+                if proceed(station).is_break() {
+                    return ControlFlow::Break(Stop::Interrupted);
+                }
+                if !family.holds(station) {
+                    return ControlFlow::Break(Stop::Edges);
+                }
+                passed += 1;
+                match passed > meshes.unwatched && !family.carries(station) {
+                    true => ControlFlow::Break(Stop::Mesh),
+                    false => ControlFlow::Continue(()),
+                }
+            },
+        );
         let (mut stations, mut events) = (curve.stations, curve.events);
         let mut beyond = None;
         while stations.last().is_some_and(|last| !family.holds(last)) {
@@ -84,37 +94,24 @@ pub(super) fn trace(
             beyond = stations.pop();
         }
         events.retain(|(state, _)| *state < stations.len());
-        let mut next = None;
-        if let (Some(last), Some(beyond)) = (stations.last(), &beyond) {
-            next = match is_uncarried {
-                true => regraded(&family, last, beyond, pace),
-                false => switched(&family, last, beyond, pace),
-            };
-        }
-        match (&next, &beyond) {
-            (Some((other, _)), _) if is_uncarried => {
-                meshes -= 1;
-                let again = begun.0.on_mesh(other.mesh.clone(), &begun.1, pace);
-                begun = again.unwrap_or(begun);
-                // The same state is the first on the other mesh.
-                let has_event = events
-                    .last()
-                    .is_some_and(|(state, _)| state + 1 == stations.len());
-                if stations.len() > 1 && !has_event {
-                    stations.pop();
-                }
-            }
-            (None, Some(beyond)) if is_uncarried => {
-                meshes = 0;
-                next = Some((family.clone(), beyond.clone()));
-            }
-            _ => (),
-        }
-        left -= stations.len();
         let end = match beyond {
             Some(_) if !is_uncarried => End::Stopped(Stop::Edges),
             _ => curve.end,
         };
+        let next = match (stations.last(), beyond) {
+            (Some(last), Some(beyond)) if is_uncarried => {
+                let regraded = meshes.regraded(&family, last, &beyond, pace);
+                let has_event = events.last().is_some_and(|e| e.0 + 1 == stations.len());
+                if regraded.is_some() && stations.len() > 1 && !has_event {
+                    // The same state is the first on the other mesh.
+                    stations.pop();
+                }
+                Some(regraded.unwrap_or_else(|| (family.clone(), beyond)))
+            }
+            (Some(last), Some(beyond)) => switched(&family, last, &beyond, pace),
+            _ => None,
+        };
+        left -= stations.len();
         if !stations.is_empty() {
             stretches.push(Stretch {
                 family: family.clone(),
@@ -129,6 +126,57 @@ pub(super) fn trace(
             None => return (stretches, end),
         }
     }
+}
+
+/// The meshes of a branch.
+struct Meshes {
+    /// The first station of the branch, on the mesh of the present lengths of elements.
+    begun: (Along, Station),
+    /// Number of changes of the mesh that may follow.
+    left: usize,
+    /// Stations that are passed on a mesh before it has to carry them, a number.
+    unwatched: usize,
+}
+
+impl Meshes {
+    /// The branch on a mesh that carries the station beyond, next to the last station that its own mesh carries; `None` where
+    /// there is no such mesh, so that the branch has to go on on its own for a while.
+    fn regraded(
+        &mut self,
+        family: &Along,
+        last: &Station,
+        beyond: &Station,
+        pace: Pace,
+    ) -> Option<(Along, Station)> {
+        /// Stations on a mesh that does not carry them before another one is tried, a number.
+        const WHILE: usize = 10;
+        self.left -= 1;
+        let next = next_to(family, last, beyond, pace);
+        self.unwatched = match (&next, self.left) {
+            (_, 0) => usize::MAX,
+            (Some(_), _) => 1,
+            (None, _) => WHILE,
+        };
+        if let Some((other, _)) = &next {
+            let (begun_on, first) = &self.begun;
+            let begun = begun_on.on_mesh(other.mesh.clone(), first, pace);
+            self.begun = begun.unwrap_or_else(|| self.begun.clone());
+        }
+        next
+    }
+}
+
+/// The branch on a mesh that carries the station beyond, next to another station.
+fn next_to(
+    family: &Along,
+    last: &Station,
+    beyond: &Station,
+    pace: Pace,
+) -> Option<(Along, Station)> {
+    let (other, start) = family.on_mesh_that_carries(beyond, last, pace)?;
+    let here = family.shape_on(last, &other)?;
+    let is_here = start.at.point.distance(&here) <= SAME_BELT;
+    (is_here && start.negative == last.negative).then_some((other, start))
 }
 
 /// The curve of a family from a station to its end, over leg after leg of the path. The curve of a branch that began at
@@ -197,17 +245,4 @@ fn switched(
         let is_here = near.at.point.distance(&last.at.point) <= SAME_SHAPE;
         (is_here && other.holds(&near)).then_some((other, near))
     })
-}
-
-/// The branch on a mesh that carries the station beyond, next to the last station that its own mesh carries.
-fn regraded(
-    family: &Along,
-    last: &Station,
-    beyond: &Station,
-    pace: Pace,
-) -> Option<(Along, Station)> {
-    let (other, start) = family.on_mesh_that_carries(beyond, last, pace)?;
-    let here = family.shape_on(last, &other)?;
-    let is_here = start.at.point.distance(&here) <= SAME_BELT;
-    (is_here && start.negative == last.negative).then_some((other, start))
 }
