@@ -313,6 +313,18 @@ def test_a_fixed_mesh_tells_what_it_makes_of_a_path():
     assert {len(branch.equilibrium(state).u) for state in (0, -1)} == {81}
 
 
+def test_states_whose_elements_turn_too_far_are_no_equilibria():
+    """Of a path on a fixed mesh, as of a solve on it; a solve of the same scenario has the same verdict."""
+    branch = pulled(elements=80)
+    first = branch.status.index("not_converged")
+    assert set(branch.status[:first]) == {"converged"}
+    assert set(branch.status[first:]) == {"not_converged"}
+    for state in (first - 1, first, -1):
+        assert fb.solve(branch.equilibrium(state).scenario).status == branch.status[state]
+    assert "elements turn by up to" in branch.equilibrium(-1).message
+    assert set(pulled().status) == {"converged"}
+
+
 def test_arrays_have_the_documented_shapes_and_belong_to_the_caller(turned):
     [branch] = turned.branches
     count, nodes = len(branch), len(turned.start.u)

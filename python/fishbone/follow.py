@@ -609,7 +609,7 @@ def _snap_row(index: int, event: Event, shape: Equilibrium) -> dict[str, Any]:
         "rib_margin": shape.rib_margin.value,
         "status": shape.status,
         "residual": max(shape.residuals),
-        "error": math.nan if shape.error is None else np.nanmax(shape.error),
+        "error": max((e for e in shape.error or () if not math.isnan(e)), default=math.nan),
         "confirmed": event.confirmed,
         "jump": event.jump,
         "released": event.released,

@@ -86,7 +86,7 @@ def _left_out(events: Sequence[Event]) -> str:
     return f"{count} of {len(events)} events are left out that a finer mesh does not confirm: try more solver.elements"
 
 
-FAR_BEYOND = 50.0
+FAR_BEYOND = 10.0
 """Largest error by the mesh along a path, over the accuracy, that is not warned of."""
 
 

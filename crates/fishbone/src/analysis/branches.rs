@@ -146,8 +146,8 @@ impl<'a> Census<'a> {
         }
     }
 
-    /// As [`Self::enter`], an equilibrium of its mesh, be it one of the belt or not; of the first mesh only if it is one, as the
-    /// search goes on on a finer one.
+    /// As [`Self::enter`], an equilibrium of its mesh, be it one of the belt or not; of the first mesh only if it is one, as
+    /// the search goes on on a finer one.
     fn enter_any(&mut self, equilibrium: Equilibrium) {
         let settings = self.settings;
         let may_enter = match self.problem.elements() > settings.coarse_elements {
@@ -306,8 +306,8 @@ impl<'a> Census<'a> {
         true
     }
 
-    /// Replaces the equilibria of this mesh alone, the lowest, by those to which they lead on meshes that follow the error, where
-    /// the problem asks for that.
+    /// Replaces the equilibria of this mesh alone, the lowest, by those to which they lead on meshes that follow the error,
+    /// where the problem asks for that.
     fn carry(&mut self, asked: &Problem) {
         let found = std::mem::take(&mut self.found);
         let (of_belt, mut of_mesh): (Vec<_>, Vec<_>) = found
@@ -354,7 +354,8 @@ impl<'a> Census<'a> {
     }
 
     /// Replaces the minima by those to which they lead on meshes that follow the error, where the problem asks for that; of
-    /// equilibria that these meshes do not separate the lowest, of those that meet the accuracy first. The result of a plain solve is among the equilibria.
+    /// equilibria that these meshes do not separate the lowest of those that meet the accuracy, else the lowest. The result of
+    /// a plain solve is among the equilibria.
     fn refine(&mut self, asked: &Problem, plain: &Equilibrium) {
         let found = std::mem::take(&mut self.found);
         let (settings, watch) = (self.settings, self.watch);

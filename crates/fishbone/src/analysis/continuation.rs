@@ -400,7 +400,7 @@ impl Diagram {
             stability: equilibrium.stability,
             status: equilibrium.status,
             residuals: equilibrium.residuals,
-            error: equilibrium.error().map(|error| error.largest()),
+            error: equilibrium.error().and_then(|error| error.largest_known()),
         }
     }
 

@@ -2,7 +2,8 @@
 
 use crate::equilibrium::{
     Equilibrium, Solved, Status, Uncertified, flat_pose, from_guess, is_slender_on_graded_mesh,
-    minimum_next_to_on, of_solution, slender_minimum_near, snapped_from, solve_near,
+    minimum_next_to_on, of_solution, of_solution_on_mesh, slender_minimum_near, snapped_from,
+    solve_near,
 };
 use crate::geometry::{Pose, Wrench, exp, log};
 use crate::names::named;
@@ -10,7 +11,7 @@ use crate::problem::program::{BeltPoint, BeltProgram};
 use crate::problem::{Mesh, Problem, Units};
 use crate::scenario::error::ScenarioError;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
-use stagewise::{Distance, FollowSettings, Follower, Program, Residuals};
+use stagewise::{Distance, FollowSettings, Follower, Program, Residuals, Solution};
 use std::ops::ControlFlow;
 use thiserror::Error;
 
@@ -348,14 +349,14 @@ impl Tracker {
         let found = from_guess(&problem, proceed);
         way.iterations += found.iterations;
         self.remember_start(way);
-        let moved = self.equilibrium().displacement(&found);
+        let moved = self.present(of_solution_on_mesh).displacement(&found);
         // A belt that is shortened by the square of a length leaves its flat shape by much this length.
         moved <= way.length().sqrt() + self.problem.snap_size() && self.restart(&found)
     }
 
     fn remember_start(&mut self, way: &mut Way) {
         if way.start.is_none() {
-            way.start = Some(self.equilibrium());
+            way.start = Some(self.present(of_solution_on_mesh));
         }
     }
 
@@ -470,12 +471,20 @@ impl Tracker {
         Ok(moved.about(self.problem.origin()))
     }
 
-    /// The present equilibrium, with all its data.
+    /// The present equilibrium, with all its data; not converged where elements turn too far for a belt.
     pub fn equilibrium(&mut self) -> Equilibrium {
+        self.present(of_solution)
+    }
+
+    /// The present equilibrium, made of the problem, its programme and the solution.
+    fn present(
+        &mut self,
+        of: fn(&Problem, BeltProgram, Solution<BeltPoint>) -> Equilibrium,
+    ) -> Equilibrium {
         let problem = self.problem_at(&self.pose);
         let problem = problem.expect("the pose was checked before the belt was led there");
         let solution = self.follower.solution();
-        of_solution(&problem, self.follower.program().clone(), solution)
+        of(&problem, self.follower.program().clone(), solution)
     }
 
     fn point(&self) -> &BeltPoint {

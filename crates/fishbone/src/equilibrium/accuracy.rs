@@ -28,13 +28,18 @@ pub struct MeshError {
 }
 
 impl MeshError {
-    /// The largest of the errors.
-    pub(crate) fn largest(&self) -> f64 {
-        self.worst().1
+    /// The largest of the errors, 0 where none is known.
+    pub(super) fn largest(&self) -> f64 {
+        self.largest_known().unwrap_or(0.0)
     }
 
-    /// The largest of the errors, with the name of its quantity.
-    pub(super) fn worst(&self) -> (&'static str, f64) {
+    /// The largest of the errors; `None` where none is known.
+    pub(crate) fn largest_known(&self) -> Option<f64> {
+        self.worst().map(|worst| worst.1)
+    }
+
+    /// The largest of the errors, with the name of its quantity; `None` where none is known.
+    pub(super) fn worst(&self) -> Option<(&'static str, f64)> {
         let errors = [
             ("energy", self.energy),
             ("position", self.position),
@@ -42,9 +47,7 @@ impl MeshError {
             ("radius", self.radius),
         ];
         let known = errors.into_iter().filter(|(_, error)| !error.is_nan());
-        known.fold(("energy", 0.0), |worst, error| {
-            if error.1 > worst.1 { error } else { worst }
-        })
+        known.reduce(|worst, error| if error.1 > worst.1 { error } else { worst })
     }
 
     /// The largest of the errors to which all elements contribute: all but that of the radius.

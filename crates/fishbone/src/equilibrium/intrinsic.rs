@@ -30,33 +30,40 @@ pub(super) fn solve(
     from: Start,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Equilibrium {
-    let (found, status, message, redundant) = match problem.unreachable_supports() {
-        Some(too_far) => (
-            start(problem),
-            Status::Infeasible,
-            too_far.to_string(),
-            None,
-        ),
-        None => {
-            let (found, fault) = find(problem, from, proceed);
-            let redundant = redundant(problem, &found.program);
-            let (status, message) = judge(problem, &found, fault, redundant.as_deref());
-            (found, status, message, redundant)
-        }
-    };
-    equilibrium(problem, found, status, message, redundant)
+    if let Some(too_far) = problem.unreachable_supports() {
+        let message = too_far.to_string();
+        return equilibrium(problem, start(problem), Status::Infeasible, message, None);
+    }
+    let (found, fault) = find(problem, from, proceed);
+    judged(problem, found, fault)
 }
 
 /// The equilibrium of a solution of a problem's programme that was found by other means; it has converged only if the
-/// programme's active sets are right for it.
+/// programme's active sets are right for it, and no element turns too far for a belt.
 pub(crate) fn of_solution(
     problem: &Problem,
     program: BeltProgram,
     solution: Solution<BeltPoint>,
 ) -> Equilibrium {
-    let redundant = redundant(problem, &program);
-    let fault = problem.active_set_fault(&program, &solution.at.point);
-    let found = Found::unestimated(program, solution);
+    let misfit = problem.active_set_fault(&program, &solution.at.point);
+    let level = Level::new(program, solution, misfit);
+    let (found, fault) = Found::checked(problem, level, &mut || ControlFlow::Continue(()));
+    judged(problem, found, fault)
+}
+
+/// The equilibrium of a mesh, be it one of the belt or not: as [`of_solution`], however far elements turn.
+pub(crate) fn of_solution_on_mesh(
+    problem: &Problem,
+    program: BeltProgram,
+    solution: Solution<BeltPoint>,
+) -> Equilibrium {
+    let misfit = problem.active_set_fault(&program, &solution.at.point);
+    judged(problem, Found::unestimated(program, solution), misfit)
+}
+
+/// The equilibrium at which a search ended, or its fault.
+fn judged(problem: &Problem, found: Found, fault: Option<String>) -> Equilibrium {
+    let redundant = redundant(problem, &found.program);
     let (status, message) = judge(problem, &found, fault, redundant.as_deref());
     equilibrium(problem, found, status, message, redundant)
 }
@@ -145,6 +152,18 @@ impl Found {
             error: error.map_or_else(OnceLock::new, OnceLock::from),
         };
         (found, fault)
+    }
+
+    /// As [`Self::of`], of a mesh that follows no error: a finer one may confirm elements that turn far.
+    fn checked(
+        problem: &Problem,
+        mut level: Level,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> (Self, Option<String>) {
+        if level.turns_too_far() {
+            level.estimate(problem, true, proceed);
+        }
+        Self::of(problem, level)
     }
 
     /// A solution of a programme whose error has not been estimated.
@@ -236,11 +255,7 @@ fn find(
         }
     };
     let (solution, fault) = settle(problem, &search, &mut program, solution, proceed);
-    let mut level = Level::new(program, solution, fault);
-    if level.turns_too_far() {
-        level.estimate(problem, true, proceed);
-    }
-    Found::of(problem, level)
+    Found::checked(problem, Level::new(program, solution, fault), proceed)
 }
 
 /// The supports and links whose constraints are redundant, by name; `None` where all are independent.

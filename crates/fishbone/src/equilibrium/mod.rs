@@ -35,7 +35,7 @@ use std::ops::ControlFlow;
 use std::sync::OnceLock;
 use thiserror::Error;
 
-pub(crate) use intrinsic::of_solution;
+pub(crate) use intrinsic::{of_solution, of_solution_on_mesh};
 pub(crate) use lifted::flat_pose;
 pub(crate) use refinement::{carries, mesh_that_carries};
 pub(crate) use search::{prolonged, prolonged_with_multipliers};
@@ -201,8 +201,14 @@ impl Equilibrium {
 
     /// Whether this is an equilibrium of its mesh, be it one of the belt or not.
     pub(crate) fn is_of_its_mesh(&self) -> bool {
-        let is_of_mesh_alone = self.solved.as_ref().is_some_and(|s| s.is_of_mesh_alone);
-        self.status == Status::Converged || is_of_mesh_alone
+        self.solved_on_mesh().is_some()
+    }
+
+    /// The programme and its solution, if this is an equilibrium of its mesh, be it one of the belt or not.
+    pub(crate) fn solved_on_mesh(&self) -> Option<&Solved> {
+        let is_converged = self.status == Status::Converged;
+        let solved = self.solved.as_ref();
+        solved.filter(|solved| is_converged || solved.is_of_mesh_alone)
     }
 
     /// Whether the solve has converged, to a minimum as far as is known.

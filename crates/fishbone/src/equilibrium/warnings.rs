@@ -34,7 +34,7 @@ impl Equilibrium {
                     .to_owned(),
             );
         };
-        let (name, largest) = error.worst();
+        let (name, largest) = error.worst()?;
         let remedy = match fixed {
             true => "leave out solver.elements, or raise it",
             false => "no mesh tried is fine enough",

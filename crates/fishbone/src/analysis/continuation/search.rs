@@ -267,7 +267,7 @@ impl Search<'_> {
         event: &Crossing,
         stretch: &Stretch,
     ) -> Option<(Along, Station)> {
-        let solved = landed.equilibrium.certified().ok()?;
+        let solved = landed.equilibrium.solved_on_mesh()?;
         let mesh = Mesh::of(landed.equilibrium.problem(), &solved.program);
         let family = stretch.family.on(mesh);
         let continuation = family.continuation(self.pace);
@@ -410,13 +410,13 @@ impl Search<'_> {
             None => snapped_from(&problem, &family.mesh, &from.at.point, proceed),
         };
         let distance = |found: &Equilibrium| {
-            let solved = found.certified().ok();
+            let solved = found.solved_on_mesh();
             let point = &event.station.at.point;
             solved.map_or(f64::INFINITY, |solved| solved.at.point.distance(point))
         };
         let found = descended.into_iter().chain(others);
         let equilibrium = found.min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
-        let solved = equilibrium.certified().ok()?;
+        let solved = equilibrium.solved_on_mesh()?;
         let objective = solved.values.objective;
         let rate = before.map_or(0.0, |before| {
             (event.station.objective - before.objective) / (event.parameter - before.parameter)
