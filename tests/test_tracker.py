@@ -133,6 +133,41 @@ def test_pose_out_of_reach_leaves_the_tracker_where_it_was() -> None:
     assert (after.status, after.snapped) == ("converged", False)
 
 
+def ends_past_each_other(y: float, **tables: Any) -> fb.Scenario:
+    """The belt with its ends drawn past each other along the start's axis, without a turn."""
+    scenario = example(**tables).to_dict()
+    scenario["supports"][1] |= {"position": [0.0, y, 0.0]}
+    return fb.Scenario.from_dict(scenario)
+
+
+def test_mesh_of_a_tracker_follows_the_error() -> None:
+    """Led to ever tighter bends, the belt keeps the energy and force of 1000 elements; its mesh changes on the way."""
+    graded: dict[str, Any] = {"solver": {}}
+    tracker = fb.Tracker(ends_past_each_other(-0.5, **graded))
+    before = len(tracker.u)
+    for y in np.linspace(-0.5, -0.95, 46):
+        assert tracker.update([0.0, y, 0.0], np.zeros(3)).status == "converged"
+    fine = fb.solve(ends_past_each_other(-0.95, elements=1000))
+    assert len(tracker.u) > before
+    assert tracker.energy == pytest.approx(fine.energy, rel=5e-3)
+    assert tracker.reaction("end").force[1] == pytest.approx(fine.reaction("end").force[1], rel=1e-2)
+
+
+def test_tracker_stops_where_elements_turn_too_far_for_a_belt() -> None:
+    """On a fixed mesh, at a pose where a solve does not converge; it keeps its last pose, and goes on from there."""
+    tracker = fb.Tracker(ends_past_each_other(-0.5, elements=40))
+    for y in np.linspace(-0.5, -0.95, 46):
+        last = tracker.energy
+        status = tracker.update([0.0, y, 0.0], np.zeros(3)).status
+        if status != "converged":
+            break
+    assert status == fb.solve(ends_past_each_other(y, elements=40)).status == "not_converged"
+    assert tracker.energy == pytest.approx(last, rel=1e-9)
+    assert tracker.position[-1] == pytest.approx([0.0, y + 0.01, 0.0], abs=1e-6)
+    assert tracker.update([0.0, -0.6, 0.0], np.zeros(3)).status == "converged"
+    assert tracker.energy == pytest.approx(fb.solve(ends_past_each_other(-0.6, elements=40)).energy, rel=1e-6)
+
+
 def test_large_update_is_made_in_steps() -> None:
     """One update over a whole sixth of the path ends where many small ones do."""
     small, large = fb.Tracker(example()), fb.Tracker(example())

@@ -73,7 +73,7 @@ class Tracker:
 
     @property
     def u(self) -> Floats:
-        """Arc length at the nodes, shape (n,); an update of a slender belt may change the mesh."""
+        """Arc length at the nodes, shape (n,); an update may change the mesh, unless the scenario fixes it."""
         return self._inner.u
 
     @property

@@ -1,9 +1,9 @@
 //! Tracking: an equilibrium is followed at the rate of a robot while one of its supports moves.
 
 use crate::equilibrium::{
-    Equilibrium, Solved, Status, Uncertified, flat_pose, from_guess, is_slender_on_graded_mesh,
-    minimum_next_to_on, of_solution, of_solution_on_mesh, slender_minimum_near, snapped_from,
-    solve_near,
+    Equilibrium, Solved, Status, Uncertified, carries, flat_pose, from_guess,
+    is_slender_on_graded_mesh, mesh_that_carries, minimum_next_to_on, of_solution,
+    of_solution_on_mesh, prolonged, slender_minimum_near, snapped_from, solve_near, turns_too_far,
 };
 use crate::geometry::{Pose, Wrench, exp, log};
 use crate::names::named;
@@ -76,6 +76,8 @@ pub struct Tracker {
     follower: Follower<BeltProgram, 6, 2, 8>,
     /// Whether the mesh is graded anew on the way.
     is_slender: bool,
+    /// Length of the ways since the error of the mesh was estimated, in U and rad.
+    unwatched: f64,
     /// Present pose of the support, in the units of the programme.
     pose: Pose,
     /// Pose of the support at which the board lies flat and at rest, in the units of the programme.
@@ -112,6 +114,7 @@ impl Tracker {
         Ok(Self {
             support,
             is_slender: is_slender_on_graded_mesh(&problem),
+            unwatched: 0.0,
             pose: Pose {
                 frame,
                 position: (position - origin) / units.length,
@@ -125,9 +128,10 @@ impl Tracker {
 
     /// Moves the support to a position and a rotation vector, world axes, and the belt with it.
     ///
-    /// Nothing is allocated where the equilibrium is followed on its mesh and the board has neither links nor bends. The mesh of
-    /// a slender belt is graded anew, unless the scenario fixes it. `proceed` is asked
-    /// during the motion whether to go on; `Break` leaves the tracker at its last pose.
+    /// Nothing is allocated where the equilibrium is followed on its mesh and the board has neither links nor bends. Unless the
+    /// scenario fixes the mesh, its error is estimated from time to time, and the belt goes on on another mesh where this one
+    /// carries it no more; the mesh of a slender belt is graded anew at every update. `proceed` is asked during the motion
+    /// whether to go on; `Break` leaves the tracker at its last pose.
     ///
     /// # Errors
     ///
@@ -155,11 +159,21 @@ impl Tracker {
             jump: 0.0,
             released: 0.0,
         };
-        let status = self.lead(&mut way, proceed);
+        self.unwatched += way.length();
+        let mut status = self.lead(&mut way, proceed);
+        if status == Status::Converged {
+            status = self.follow_error(&mut way, proceed);
+        }
         if status != Status::Converged {
             (way.jump, way.released) = (0.0, 0.0);
-            if let Some(start) = way.start {
-                self.restart(&start);
+            match way.start {
+                Some(start) => {
+                    self.restart(&start);
+                }
+                None => {
+                    self.pose = from;
+                    self.return_to_start();
+                }
             }
         }
         let units = self.units();
@@ -181,6 +195,7 @@ impl Tracker {
         let Some([from, to]) = self.beside_flat(way) else {
             return self.lead_along(way, proceed);
         };
+        self.remember_start(way);
         let ends = [from, to, 1.0].map(|share| way.pose(share));
         for (leg, end) in ends.into_iter().enumerate() {
             (way.from, way.goal) = (self.pose, end);
@@ -195,6 +210,56 @@ impl Tracker {
             }
         }
         Status::Converged
+    }
+
+    /// Goes on on another mesh where the present one carries the shape at the end of a way no more; not converged where elements
+    /// turn too far for a belt.
+    fn follow_error(
+        &mut self,
+        way: &mut Way,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Status {
+        /// Length of the ways after which the error is estimated again, in U and rad.
+        const WATCHED: f64 = 0.02;
+        let is_far = turns_too_far(self.follower.program(), self.point());
+        let is_watched = !self.is_slender && (self.unwatched >= WATCHED || way.jump > 0.0);
+        if !is_far && !is_watched {
+            return Status::Converged;
+        }
+        self.unwatched = 0.0;
+        let is_carried = match self.on_mesh_that_carries(way, proceed) {
+            Some(found) => self.restart(&found),
+            None => !is_far,
+        };
+        match is_carried {
+            true => Status::Converged,
+            false => self.equilibrium().status,
+        }
+    }
+
+    /// The present equilibrium on a mesh that carries it; `None` where its own mesh does, or where there is no other.
+    fn on_mesh_that_carries(
+        &mut self,
+        way: &mut Way,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Option<Equilibrium> {
+        /// Largest displacement of a node from mesh to mesh, in U: beyond, the shape is another one.
+        const SAME_BELT: f64 = 1e-2;
+        let problem = self.problem_at(&self.pose).ok()?;
+        let at = self.follower.solution().at;
+        let (own, objective) = (self.follower.program(), self.follower.values().objective);
+        if carries(&problem, own, &at, objective) {
+            return None;
+        }
+        let mesh = mesh_that_carries(&problem, own, &at)?;
+        let mut program = problem.program_on(&mesh)?;
+        let shape = prolonged(own, &at.point, &program);
+        problem.choose_active_sets(&mut program, &shape);
+        let mesh = Mesh::of(&problem, &program);
+        let found = minimum_next_to_on(&problem, &mesh, &shape, proceed);
+        way.iterations += found.iterations;
+        let is_here = |solved: &Solved| solved.at.point.distance(&shape) <= SAME_BELT;
+        found.certified().is_ok_and(is_here).then_some(found)
     }
 
     /// Leads the support along a way as far as a tangent leads on. Where the ribs come to other edges, the belt is followed up
@@ -433,7 +498,8 @@ impl Tracker {
     fn restart(&mut self, found: &Equilibrium) -> bool {
         match Self::new(found, self.support) {
             Ok(other) => {
-                *self = other;
+                let unwatched = self.unwatched;
+                *self = Self { unwatched, ..other };
                 true
             }
             Err(_) => false,

@@ -250,6 +250,26 @@ pub(crate) fn mesh_that_carries(
     (mesh.elements() <= MOST).then_some(mesh)
 }
 
+/// Whether an element of a shape turns so far that its equations are no longer those of a belt.
+pub(crate) fn turns_too_far(program: &BeltProgram, shape: &BeltPoint) -> bool {
+    largest_turn(program, shape) > MOST_TURN
+}
+
+/// Largest angle by which an element of a shape turns.
+fn largest_turn(program: &BeltProgram, shape: &BeltPoint) -> f64 {
+    let turns = program.elements().map(|element| turn_of(shape, element));
+    turns.fold(0.0, f64::max)
+}
+
+/// Angle by which an element of a shape turns if it turns as fast all along as at its tighter end.
+fn turn_of(shape: &BeltPoint, (k, element): (usize, &Element)) -> f64 {
+    let rate = |node: usize| {
+        let [bend, slope] = shape.fields[node].into();
+        bend.hypot(slope * bend).hypot(element.geodesic)
+    };
+    element.length * rate(k).max(rate(k + 1))
+}
+
 /// Whether ribs turn with a density that does not know the width: they turn from element to element as the belt is led, the more
 /// often the finer these are.
 fn may_turn_anywhere(program: &BeltProgram, at: &BeltPoint) -> bool {
@@ -420,7 +440,7 @@ impl Level {
 
     /// Whether an element turns so far that its equations are no longer those of a belt.
     pub(super) fn turns_too_far(&self) -> bool {
-        self.turn() > MOST_TURN
+        turns_too_far(&self.program, &self.solution.at.point)
     }
 
     /// Whether a finer mesh has much the same solution, without elements that turn too far for any comparison.
@@ -477,18 +497,11 @@ impl Level {
 
     /// The largest angle by which an element turns.
     fn turn(&self) -> f64 {
-        let elements = self.program.elements();
-        let turns = elements.map(|element| self.turn_of(element));
-        turns.fold(0.0, f64::max)
+        largest_turn(&self.program, &self.solution.at.point)
     }
 
-    /// Angle by which an element turns if it turns as fast all along as at its tighter end.
-    fn turn_of(&self, (k, element): (usize, &Element)) -> f64 {
-        let rate = |node: usize| {
-            let [bend, slope] = self.solution.at.point.fields[node].into();
-            bend.hypot(slope * bend).hypot(element.geodesic)
-        };
-        element.length * rate(k).max(rate(k + 1))
+    fn turn_of(&self, element: (usize, &Element)) -> f64 {
+        turn_of(&self.solution.at.point, element)
     }
 
     /// A mesh on which the error should be within the accuracy. A belt that may slide along itself has no place on a graded

@@ -27,7 +27,7 @@ impl Equilibrium {
         if let Some(warning) = self.too_coarse_for_width().filter(|_| fixed) {
             return Some(warning);
         }
-        self.certified().ok()?;
+        let solved = self.certified().ok()?;
         let Some(error) = self.error() else {
             return Some(
                 "the error by the mesh could not be estimated: a mesh twice as fine has no equilibrium next to this one"
@@ -36,8 +36,11 @@ impl Equilibrium {
         };
         let (name, largest) = error.worst()?;
         let remedy = match fixed {
-            true => "leave out solver.elements, or raise it",
-            false => "no mesh tried is fine enough",
+            true => "leave out solver.elements, or raise it".to_owned(),
+            false => {
+                let elements = solved.program.elements().count();
+                format!("its mesh of {elements} elements was not refined further")
+            }
         };
         (largest > accuracy).then(|| {
             format!(
