@@ -5,7 +5,8 @@
 The scenarios are those of random_poses.py. A random shape has a bend and a rib slope that are sums of five cosines with
 random amplitudes and phases, up to the bend of a ring and slopes of a half, root mean square; it does not meet its
 supports. Every shape is solved again on a mesh twice as fine. Two energies count as one level if their difference is
-less than this refinement changes one of them.
+less than this refinement changes one of them. A level that one search alone finds is a matter of chance: further
+searches of the same kind find others.
 """
 
 from __future__ import annotations
@@ -68,22 +69,28 @@ def level(coarse: Equilibrium) -> Level | None:
     return None if np.max(apart) > NEAR else Level(coarse.energy, fine.energy)
 
 
-def random_minima(scenario: Scenario, rng: np.random.Generator, guesses: int) -> list[Equilibrium]:
-    """Minima that searches from random shapes find, one of each energy."""
+def random_minima(scenario: Scenario, rng: np.random.Generator, guesses: int) -> list[tuple[Equilibrium, int]]:
+    """Minima that searches from random shapes find, one of each energy, and how many of the searches end there."""
     found = [fb.solve(scenario, start=random_shape(rng)) for _ in range(guesses)]
-    distinct: list[Equilibrium] = []
+    distinct: list[tuple[Equilibrium, int]] = []
     for minimum in sorted((e for e in found if e.status == "converged" and e.stable), key=lambda e: e.energy):
-        if not distinct or minimum.energy - distinct[-1].energy > SAME_LEVEL * abs(minimum.energy):
-            distinct.append(minimum)
+        if not distinct or minimum.energy - distinct[-1][0].energy > SAME_LEVEL * abs(minimum.energy):
+            distinct.append((minimum, 1))
+        else:
+            lowest, times = distinct[-1]
+            distinct[-1] = (lowest, times + 1)
     return distinct
 
 
-def apart(levels: list[Level]) -> list[Level]:
-    """The distinct levels."""
-    distinct: list[Level] = []
-    for one in levels:
-        if not any(one.is_same(other) for other in distinct):
-            distinct.append(one)
+def apart(levels: list[tuple[Level, int]]) -> list[tuple[Level, int]]:
+    """The distinct levels, and how many searches end at each."""
+    distinct: list[tuple[Level, int]] = []
+    for one, times in levels:
+        same = next((k for k, (other, _) in enumerate(distinct) if one.is_same(other)), None)
+        if same is None:
+            distinct.append((one, times))
+        else:
+            distinct[same] = (distinct[same][0], distinct[same][1] + times)
     return distinct
 
 
@@ -95,38 +102,43 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
     rng = np.random.default_rng(options.seed)
-    total = {"levels": 0, "refuted": 0, "missed": 0, "branches": 0, "unconfirmed": 0}
+    total = {"levels": 0, "single": 0, "refuted": 0, "missed": 0, "often": 0, "branches": 0, "unconfirmed": 0}
     for index in range(options.count):
         scenario = random_poses.scenario(random_poses.ENERGIES[index % 3], *random_poses.pose(rng))
         began = time.perf_counter()
         branches = fb.branches(scenario)
         took = time.perf_counter() - began
         by_chance = random_minima(scenario, rng, options.guesses)
-        levels, chance_levels = [level(b) for b in branches], [level(e) for e in by_chance]
+        levels = [level(b) for b in branches]
         known = [one for one in levels if one is not None]
-        true = [one for one in chance_levels if one is not None]
-        lost = [one.coarse for one in true if not any(one.is_same(other) for other in known)]
+        true = [(one, times) for one, times in ((level(e), times) for e, times in by_chance) if one is not None]
+        lost = [(one.coarse, times) for one, times in true if not any(one.is_same(other) for other in known)]
         doubtful = [b.energy for b, one in zip(branches, levels, strict=True) if one is None]
-        distinct = len(apart(true))
-        total["levels"] += distinct
+        distinct = apart(true)
+        total["levels"] += len(distinct)
+        total["single"] += sum(times == 1 for _, times in distinct)
         total["refuted"] += len(by_chance) - len(true)
         total["missed"] += len(lost)
+        total["often"] += sum(times > 1 for _, times in lost)
         total["branches"] += len(branches)
         total["unconfirmed"] += len(doubtful)
         minima = sum(b.stable is not False for b in branches)
         print(
             f"{index:3d} {scenario.to_dict()['energy']:10s} {took:5.1f} s, "
             f"{minima} minima and {len(branches) - minima} saddles; "
-            f"random levels {distinct}, minima {len(true)} of {len(by_chance)}, "
-            f"missed {np.round(lost, 3)}, unconfirmed {np.round(doubtful, 3)}",
+            f"random levels {len(distinct)}, minima {len(true)} of {len(by_chance)}, "
+            f"missed (energy, searches) {[(round(energy, 3), times) for energy, times in lost]}, "
+            f"unconfirmed {np.round(doubtful, 3)}",
             flush=True,
         )
     rows = [
         ["scenarios", str(options.count)],
         ["random searches of each", str(options.guesses)],
         ["levels that the random searches find", str(total["levels"])],
+        ["of these found by one search alone", str(total["single"])],
         ["minima of the random searches that are unconfirmed on refinement", str(total["refuted"])],
         ["levels that `branches` misses", str(total["missed"])],
+        ["of these found by more than one search", str(total["often"])],
         ["equilibria that `branches` finds", str(total["branches"])],
         ["of these unconfirmed on refinement", str(total["unconfirmed"])],
     ]
