@@ -14,6 +14,7 @@ import pytest
 from scipy.optimize import brentq
 from scipy.special import j0
 
+import fishbone as fb
 from helpers import arc, belt, board, solve_any, support
 
 FOLDER = Path(__file__).parents[1] / "benchmarks"
@@ -67,6 +68,26 @@ def test_quarter_twist_over_the_whole_length_needs_slack() -> None:
     assert (found.status, found.iterations) == ("infeasible", 0)
     missing = 1.0 - math.sqrt(1.0 - width**2 / 2.0)
     assert f"move them closer, by {missing:.6f} at least" in found.message
+
+
+def test_clamped_stiffeners_that_leave_the_rest_too_short_are_refused() -> None:
+    """The ends of two stiffeners of 5, which point the same way, are √(20² + 60²) apart, held by 60 of belt."""
+
+    def folded(y: float) -> fb.Scenario:
+        stiff, soft = ({"kind": kind, "length": length} for kind, length in (("rigid", 5.0), ("straight", 60.0)))
+        ends = [support("start", [0, 0, 0], [0, 0, 0]), support("end", [20, y, 0], [0, 0, math.pi])]
+        tables = board([stiff, soft, stiff], ends, width=5.0) | {"solver": {"bulge": [0.0, 1.0, 0.0]}}
+        return fb.Scenario.from_dict(tables)
+
+    reach = math.sqrt(60.0**2 - 20.0**2)
+    refused = fb.solve(folded(reach + 1e-3))
+    assert (refused.status, refused.iterations) == ("infeasible", 0)
+    assert "at u = 5 and u = 65" in refused.message
+    assert fb.solve(folded(reach - 5.0)).status == "converged"
+    tracker = fb.Tracker(folded(0.0))
+    update = tracker.update([20.0, 60.0, 0.0], [0.0, 0.0, math.pi])
+    assert (update.status, update.iterations) == ("infeasible", 0)
+    assert tracker.update([20.0, 1.0, 0.0], [0.0, 0.0, math.pi]).status == "converged"
 
 
 def test_link_that_leaves_the_rest_too_short_is_refused() -> None:

@@ -1,19 +1,24 @@
 //! Tracking: an equilibrium is followed at the rate of a robot while one of its supports moves.
 
+mod mesh;
+mod way;
+
 use crate::equilibrium::{
-    Equilibrium, Solved, Status, Uncertified, carries, flat_pose, from_guess,
-    is_slender_on_graded_mesh, mesh_that_carries, minimum_next_to_on, of_solution,
-    of_solution_on_mesh, prolonged, slender_minimum_near, snapped_from, solve_near, turns_too_far,
+    Equilibrium, Solved, Status, Uncertified, flat_pose, from_guess, is_slender_on_graded_mesh,
+    largest_change, minimum_next_to_on, of_solution, of_solution_on_mesh, slender_minimum_near,
+    snapped_from, solve_near,
 };
 use crate::geometry::{Pose, Wrench, exp, log};
 use crate::names::named;
 use crate::problem::program::{BeltPoint, BeltProgram};
 use crate::problem::{Mesh, Problem, Units};
 use crate::scenario::error::ScenarioError;
-use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+use crate::scenario::{Scenario, SupportSpec};
+use nalgebra::{Matrix3, Vector3};
 use stagewise::{Distance, FollowSettings, Follower, Program, Residuals, Solution};
 use std::ops::ControlFlow;
 use thiserror::Error;
+use way::{Way, distance};
 
 /// Most changes of the active edges, or attempts of one, on the way to a pose, a number.
 const SWITCHES: usize = 40;
@@ -76,8 +81,8 @@ pub struct Tracker {
     follower: Follower<BeltProgram, 6, 2, 8>,
     /// Whether the mesh is graded anew on the way.
     is_slender: bool,
-    /// Length of the ways since the error of the mesh was estimated, in U and rad.
-    unwatched: f64,
+    /// Largest change of turning within an element when the error of the mesh was estimated last, in rad.
+    watched: f64,
     /// Present pose of the support, in the units of the programme.
     pose: Pose,
     /// Pose of the support at which the board lies flat and at rest, in the units of the programme.
@@ -114,7 +119,7 @@ impl Tracker {
         Ok(Self {
             support,
             is_slender: is_slender_on_graded_mesh(&problem),
-            unwatched: 0.0,
+            watched: largest_change(program, point),
             pose: Pose {
                 frame,
                 position: (position - origin) / units.length,
@@ -129,8 +134,8 @@ impl Tracker {
     /// Moves the support to a position and a rotation vector, world axes, and the belt with it.
     ///
     /// Nothing is allocated where the equilibrium is followed on its mesh and the board has neither links nor bends. Unless the
-    /// scenario fixes the mesh, its error is estimated from time to time, and the belt goes on on another mesh where this one
-    /// carries it no more; the mesh of a slender belt is graded anew at every update. `proceed` is asked during the motion
+    /// scenario fixes the mesh, its error is estimated where turning changes more within an element than before, and the belt
+    /// goes on on another mesh where this one carries it no more; the mesh of a slender belt is graded anew at every update. `proceed` is asked during the motion
     /// whether to go on; `Break` leaves the tracker at its last pose.
     ///
     /// # Errors
@@ -150,30 +155,22 @@ impl Tracker {
             frame: exp(rotation),
             position: (position - self.problem.origin()) / self.units().length,
         };
-        let mut way = Way {
-            from,
-            turn: turn_between(&from.frame, &goal.frame),
-            goal,
-            start: None,
-            iterations: 0,
-            jump: 0.0,
-            released: 0.0,
+        let mut way = Way::new(from, goal);
+        let mut status = match self.is_out_of_reach(&goal) {
+            true => Status::Infeasible,
+            false => self.lead(&mut way, proceed),
         };
-        self.unwatched += way.length();
-        let mut status = self.lead(&mut way, proceed);
         if status == Status::Converged {
             status = self.follow_error(&mut way, proceed);
+            if status != Status::Converged && way.start.is_none() {
+                self.pose = from;
+                self.return_to_start();
+            }
         }
         if status != Status::Converged {
             (way.jump, way.released) = (0.0, 0.0);
-            match way.start {
-                Some(start) => {
-                    self.restart(&start);
-                }
-                None => {
-                    self.pose = from;
-                    self.return_to_start();
-                }
+            if let Some(start) = way.start {
+                self.restart(&start);
             }
         }
         let units = self.units();
@@ -188,6 +185,26 @@ impl Tracker {
         })
     }
 
+    /// Whether a pose is proved to be out of reach. The proof is only tried where the belt is nearly straight to another support.
+    fn is_out_of_reach(&self, pose: &Pose) -> bool {
+        /// Distance over the length of the belt in between from which the proof is tried.
+        const NEARLY: f64 = 0.9;
+        let Scenario { belt, supports, .. } = self.problem.scenario();
+        let length = belt.length();
+        let own = supports[self.support].at.arc_length(length);
+        let position = self.in_scenario(pose).position;
+        let is_nearly_straight = |other: &SupportSpec| {
+            let between = (other.at.arc_length(length) - own).abs();
+            let along = |k: usize| other.components()[k].map_or(0.0, |held| held - position[k]);
+            Vector3::from_fn(|k, _| along(k)).norm() > NEARLY * between
+        };
+        let mut others = supports.iter().enumerate();
+        others.any(|(i, other)| i != self.support && is_nearly_straight(other))
+            && self
+                .problem_at(pose)
+                .is_ok_and(|problem| problem.unreachable_supports().is_some())
+    }
+
     /// Leads the support along a way. Next to the pose at which the board lies flat no tangent leads on: there it is solved.
     fn lead(&mut self, way: &mut Way, proceed: &mut dyn FnMut() -> ControlFlow<()>) -> Status {
         /// Length of a way without motion, in U and rad.
@@ -198,8 +215,7 @@ impl Tracker {
         self.remember_start(way);
         let ends = [from, to, 1.0].map(|share| way.pose(share));
         for (leg, end) in ends.into_iter().enumerate() {
-            (way.from, way.goal) = (self.pose, end);
-            way.turn = turn_between(&way.from.frame, &way.goal.frame);
+            way.redirect(self.pose, end);
             let is_solved = leg == 1 && self.solve_beside_flat(way, proceed);
             if is_solved || way.length() <= NOWHERE {
                 continue;
@@ -210,56 +226,6 @@ impl Tracker {
             }
         }
         Status::Converged
-    }
-
-    /// Goes on on another mesh where the present one carries the shape at the end of a way no more; not converged where elements
-    /// turn too far for a belt.
-    fn follow_error(
-        &mut self,
-        way: &mut Way,
-        proceed: &mut dyn FnMut() -> ControlFlow<()>,
-    ) -> Status {
-        /// Length of the ways after which the error is estimated again, in U and rad.
-        const WATCHED: f64 = 0.02;
-        let is_far = turns_too_far(self.follower.program(), self.point());
-        let is_watched = !self.is_slender && (self.unwatched >= WATCHED || way.jump > 0.0);
-        if !is_far && !is_watched {
-            return Status::Converged;
-        }
-        self.unwatched = 0.0;
-        let is_carried = match self.on_mesh_that_carries(way, proceed) {
-            Some(found) => self.restart(&found),
-            None => !is_far,
-        };
-        match is_carried {
-            true => Status::Converged,
-            false => self.equilibrium().status,
-        }
-    }
-
-    /// The present equilibrium on a mesh that carries it; `None` where its own mesh does, or where there is no other.
-    fn on_mesh_that_carries(
-        &mut self,
-        way: &mut Way,
-        proceed: &mut dyn FnMut() -> ControlFlow<()>,
-    ) -> Option<Equilibrium> {
-        /// Largest displacement of a node from mesh to mesh, in U: beyond, the shape is another one.
-        const SAME_BELT: f64 = 1e-2;
-        let problem = self.problem_at(&self.pose).ok()?;
-        let at = self.follower.solution().at;
-        let (own, objective) = (self.follower.program(), self.follower.values().objective);
-        if carries(&problem, own, &at, objective) {
-            return None;
-        }
-        let mesh = mesh_that_carries(&problem, own, &at)?;
-        let mut program = problem.program_on(&mesh)?;
-        let shape = prolonged(own, &at.point, &program);
-        problem.choose_active_sets(&mut program, &shape);
-        let mesh = Mesh::of(&problem, &program);
-        let found = minimum_next_to_on(&problem, &mesh, &shape, proceed);
-        way.iterations += found.iterations;
-        let is_here = |solved: &Solved| solved.at.point.distance(&shape) <= SAME_BELT;
-        found.certified().is_ok_and(is_here).then_some(found)
     }
 
     /// Leads the support along a way as far as a tangent leads on. Where the ribs come to other edges, the belt is followed up
@@ -498,8 +464,8 @@ impl Tracker {
     fn restart(&mut self, found: &Equilibrium) -> bool {
         match Self::new(found, self.support) {
             Ok(other) => {
-                let unwatched = self.unwatched;
-                *self = Self { unwatched, ..other };
+                let watched = self.watched.max(other.watched);
+                *self = Self { watched, ..other };
                 true
             }
             Err(_) => false,
@@ -603,53 +569,4 @@ impl Tracker {
         }
         self.units().wrench(wrenches[support])
     }
-}
-
-/// A way of the support from pose to pose, and what has happened on it.
-struct Way {
-    from: Pose,
-    goal: Pose,
-    /// Turn of the support, in its own axes.
-    turn: Vector3<f64>,
-    /// The equilibrium at its start, once the belt has been led on in parts.
-    start: Option<Equilibrium>,
-    iterations: usize,
-    /// Largest displacement of a node in a snap, in U.
-    jump: f64,
-    /// Energy released, in mean R_f/U.
-    released: f64,
-}
-
-impl Way {
-    /// Length, displacement in U and turn in rad.
-    fn length(&self) -> f64 {
-        (self.goal.position - self.from.position).norm() + self.turn.norm()
-    }
-
-    /// The pose at a share of the way.
-    fn pose(&self, share: f64) -> Pose {
-        if share >= 1.0 {
-            return self.goal;
-        }
-        Pose {
-            position: self.from.position.lerp(&self.goal.position, share),
-            frame: self.from.frame * exp(&(share * self.turn)),
-        }
-    }
-
-    fn add(&mut self, jump: f64, released: f64) {
-        self.jump = self.jump.max(jump);
-        self.released += released;
-    }
-}
-
-/// Distance of two poses, displacement in U and turn in rad.
-fn distance(from: &Pose, to: &Pose) -> f64 {
-    (to.position - from.position).norm() + turn_between(&from.frame, &to.frame).norm()
-}
-
-/// The turn from one frame to another as a rotation vector in the axes of the first.
-fn turn_between(from: &Matrix3<f64>, to: &Matrix3<f64>) -> Vector3<f64> {
-    let turn = Rotation3::from_matrix_unchecked(from.tr_mul(to));
-    UnitQuaternion::from_rotation_matrix(&turn).scaled_axis()
 }

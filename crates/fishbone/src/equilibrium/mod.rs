@@ -37,7 +37,7 @@ use thiserror::Error;
 
 pub(crate) use intrinsic::{of_solution, of_solution_on_mesh};
 pub(crate) use lifted::flat_pose;
-pub(crate) use refinement::{carries, mesh_that_carries, turns_too_far};
+pub(crate) use refinement::{carries, largest_change, mesh_that_carries, turns_too_far};
 pub(crate) use search::{prolonged, prolonged_with_multipliers};
 
 named! {

@@ -9,6 +9,7 @@ use crate::problem::program::{BeltPoint, BeltProgram};
 use crate::problem::{Mesh, Problem};
 use crate::scenario::SAME_PLACE;
 use crate::strip::element::Element;
+use nalgebra::Vector2;
 use slender::narrowed;
 pub(super) use slender::{
     PER_WIDTH, is_slender, mesh_about_ribs, mesh_for_ribs_anywhere, ribs_turn, widened,
@@ -259,6 +260,19 @@ pub(crate) fn turns_too_far(program: &BeltProgram, shape: &BeltPoint) -> bool {
 fn largest_turn(program: &BeltProgram, shape: &BeltPoint) -> f64 {
     let turns = program.elements().map(|element| turn_of(shape, element));
     turns.fold(0.0, f64::max)
+}
+
+/// Largest difference between the angles by which an element of a shape would turn if it turned all along as at either end, in
+/// rad: the error of a mesh grows with it.
+pub(crate) fn largest_change(program: &BeltProgram, shape: &BeltPoint) -> f64 {
+    let change = |(k, element): (usize, &Element)| {
+        let rates = [k, k + 1].map(|node| {
+            let [bend, slope] = shape.fields[node].into();
+            Vector2::new(bend, slope * bend)
+        });
+        element.length * (rates[1] - rates[0]).norm()
+    };
+    program.elements().map(change).fold(0.0, f64::max)
 }
 
 /// Angle by which an element of a shape turns if it turns as fast all along as at its tighter end.

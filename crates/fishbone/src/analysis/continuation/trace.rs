@@ -176,7 +176,9 @@ fn next_to(
     let (other, start) = family.on_mesh_that_carries(beyond, last, pace)?;
     let here = family.shape_on(last, &other)?;
     let is_here = start.at.point.distance(&here) <= SAME_BELT;
-    (is_here && start.negative == last.negative).then_some((other, start))
+    // Beside a fold one Newton step tells of an error on any mesh.
+    let is_better = || other.carries(&start);
+    (is_here && start.negative == last.negative && is_better()).then_some((other, start))
 }
 
 /// The curve of a family from a station to its end, over leg after leg of the path. The curve of a branch that began at

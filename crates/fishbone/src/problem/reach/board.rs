@@ -171,6 +171,32 @@ fn shortest_through(first: Vector2<f64>, gates: &[Gate], last: Vector2<f64>) -> 
     length + (last - turn).norm()
 }
 
+/// The arc lengths of the ends of the straight stiff piece that a frame at an arc length holds; `None` where there is none, and
+/// on a closed belt. A frame at a corner is that before it.
+pub(super) fn stiffener_about(u: f64, belt: &BeltSpec) -> Option<[f64; 2]> {
+    let same = SAME_PLACE * belt.length();
+    let (mut at, mut goes_on) = (0.0, false);
+    let (mut pieces, mut corners) = (Vec::<[f64; 2]>::new(), Vec::new());
+    for segment in &belt.segments {
+        let next = at + segment.length();
+        let is_stiff = matches!(segment, SegmentSpec::Rigid { .. });
+        match (is_stiff, pieces.last_mut()) {
+            (true, Some(piece)) if goes_on => piece[1] = next,
+            (true, _) => pieces.push([at, next]),
+            (false, _) if matches!(segment, SegmentSpec::Corner { .. }) => corners.push(at),
+            (false, _) => {}
+        }
+        (at, goes_on) = (next, is_stiff);
+    }
+    let is_here = |place: f64| (place - u).abs() <= same;
+    let is_at_corner = corners.into_iter().any(is_here);
+    let holds = |piece: &[f64; 2]| {
+        let is_beyond_corner = is_at_corner && is_here(piece[0]);
+        piece[0] <= u + same && u <= piece[1] + same && !is_beyond_corner
+    };
+    pieces.into_iter().find(holds).filter(|_| !belt.closed)
+}
+
 /// The stretches between two arc lengths in rising order. A support at a corner holds the frame before it.
 fn stretches([from, to]: [f64; 2], belt: &BeltSpec) -> Vec<Stretch> {
     let same = SAME_PLACE * belt.length();
@@ -353,6 +379,31 @@ mod tests {
         // By way of the spine's corner.
         let by_corner = 0.5 + 2.0 * 0.25f64.sin();
         assert!((found - by_corner).abs() < 1e-9, "{found} {by_corner}");
+    }
+
+    #[test]
+    fn test_stiffener_that_a_frame_holds_ends_at_corners() {
+        let stiff = |length| SegmentSpec::Rigid { length };
+        let turn = SegmentSpec::Corner { angle: 0.3 };
+        let board = belt(vec![
+            stiff(0.1),
+            stiff(0.2),
+            turn,
+            stiff(0.3),
+            SegmentSpec::straight(0.4),
+        ]);
+        let of = |u: f64| stiffener_about(u, &board).map(|ends| ends.map(|u| (10.0 * u).round()));
+        assert_eq!(of(0.0), Some([0.0, 3.0]));
+        assert_eq!(of(0.3), Some([0.0, 3.0]));
+        assert_eq!(of(0.35), Some([3.0, 6.0]));
+        assert_eq!(of(0.6), Some([3.0, 6.0]));
+        assert_eq!(of(0.7), None);
+        let beyond = belt(vec![
+            SegmentSpec::straight(0.4),
+            SegmentSpec::Corner { angle: 0.3 },
+            stiff(0.6),
+        ]);
+        assert_eq!(stiffener_about(0.4, &beyond), None);
     }
 
     #[test]

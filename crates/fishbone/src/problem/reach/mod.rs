@@ -1,13 +1,14 @@
 //! The reach of the belt: whether it is long enough for its supports and links.
 //!
 //! No two points of an inextensible belt are farther apart in space than the length of a path between them on the flat board.
-//! This is checked for the points whose places supports hold: of the spine, and of both edges where a rib is held.
+//! This is checked for the points whose places supports hold: of the spine, of both edges where a rib is held, and at the ends
+//! of the stiffener that a clamp holds.
 
 mod board;
 
 use super::Problem;
 use crate::scenario::{Axis, BeltSpec, LinkSpec, Scenario, SupportSpec};
-use board::{BoardPoint, distance};
+use board::{BoardPoint, distance, stiffener_about};
 use nalgebra::Vector3;
 use std::fmt;
 
@@ -76,30 +77,41 @@ struct HeldPoint {
     on_board: BoardPoint,
     /// Place of the spine, each component or none.
     position: [Option<f64>; 3],
-    /// Offset from the spine.
+    /// Offset from there: across the spine, and along a stiffener.
     across: Vector3<f64>,
 }
 
 impl HeldPoint {
-    /// The points that a support holds: of the spine and, where it holds the rib, the rib's two ends.
+    /// The points that a support holds: of the spine and, where it holds the rib, the rib's two ends; the same at the ends of
+    /// the stiffener that a clamp holds.
     fn of((i, support): (usize, &SupportSpec), scenario: &Scenario) -> Vec<Self> {
         let belt = &scenario.belt;
         let u = support.at.arc_length(belt.length());
-        let at = |v: f64, zeta: Vector3<f64>| Self {
+        let at = |along: f64, v: f64, across: Vector3<f64>| Self {
             support: i,
-            on_board: BoardPoint { u, v },
+            on_board: BoardPoint { u: u + along, v },
             position: support.components(),
-            across: v * zeta,
+            across,
         };
         let holds_rib = scenario.is_square_rib(support) && !belt.closed;
         let axis_is_held = matches!(support.hinge, None | Some(Axis::Zeta));
         let frame = support.frame().filter(|_| holds_rib && axis_is_held);
         let zeta = frame.map(|frame| frame.column(2).into_owned());
         let half = 0.5 * belt.width;
-        let ends = zeta.map(|zeta| [half, -half].map(|v| at(v, zeta)));
-        [at(0.0, Vector3::zeros())]
+        let ends = zeta.map(|zeta| [half, -half].map(|v| at(0.0, v, v * zeta)));
+        let frame = support.frame().filter(|_| support.hinge.is_none());
+        let stiffener = frame.zip(stiffener_about(u, belt));
+        let beyond = stiffener.map(|(frame, ends)| {
+            let apart = ends.map(|end| end - u).into_iter().filter(|d| *d != 0.0);
+            let points = apart.flat_map(|along| [0.0, half, -half].map(|v| (along, v)));
+            let points = points
+                .map(|(along, v)| at(along, v, along * frame.column(1) + v * frame.column(2)));
+            points.collect::<Vec<_>>()
+        });
+        [at(0.0, 0.0, Vector3::zeros())]
             .into_iter()
             .chain(ends.into_iter().flatten())
+            .chain(beyond.into_iter().flatten())
             .collect()
     }
 
@@ -128,7 +140,7 @@ struct Span {
     held: String,
     /// Vector between the places of the spine, along the axes on which both are held.
     chord: Vector3<f64>,
-    /// Difference of the points' offsets from the spine, along the same axes.
+    /// Difference of the points' offsets from these places, along the same axes.
     across: Vector3<f64>,
     /// The belt between the points.
     belt: f64,

@@ -1,0 +1,70 @@
+//! The mesh of a tracker follows the error of its shape.
+
+use super::Tracker;
+use super::way::Way;
+use crate::equilibrium::{
+    Equilibrium, Solved, Status, carries, largest_change, mesh_that_carries, minimum_next_to_on,
+    prolonged, turns_too_far,
+};
+use crate::problem::Mesh;
+use stagewise::Distance;
+use std::ops::ControlFlow;
+
+impl Tracker {
+    /// Goes on on another mesh where the present one carries the shape at the end of a way no more; not converged where elements
+    /// turn too far for a belt.
+    pub(super) fn follow_error(
+        &mut self,
+        way: &mut Way,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Status {
+        /// Change within an element over that of the last estimate from which the error is estimated again, dimensionless.
+        const GROWN: f64 = 1.5;
+        let (program, point) = (self.follower.program(), self.point());
+        let change = largest_change(program, point);
+        let is_far = turns_too_far(program, point);
+        let has_changed = way.jump > 0.0 || change > GROWN * self.watched;
+        let is_watched = !self.is_slender && has_changed;
+        if !is_far && !is_watched {
+            return Status::Converged;
+        }
+        let better = self.on_mesh_that_carries(way, proceed);
+        self.watched = change.max(self.watched);
+        let is_carried = match better {
+            Some(better) => {
+                self.watched = 0.0;
+                self.restart(&better)
+            }
+            None => !is_far,
+        };
+        match is_carried {
+            true => Status::Converged,
+            false => self.equilibrium().status,
+        }
+    }
+
+    /// The present equilibrium on a mesh that carries it; `None` where its own mesh does, or where there is no other.
+    fn on_mesh_that_carries(
+        &mut self,
+        way: &mut Way,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Option<Equilibrium> {
+        /// Largest displacement of a node from mesh to mesh, in U: beyond, the shape is another one.
+        const SAME_BELT: f64 = 1e-2;
+        let problem = self.problem_at(&self.pose).ok()?;
+        let at = self.follower.solution().at;
+        let (own, objective) = (self.follower.program(), self.follower.values().objective);
+        if carries(&problem, own, &at, objective) {
+            return None;
+        }
+        let mesh = mesh_that_carries(&problem, own, &at)?;
+        let mut program = problem.program_on(&mesh)?;
+        let shape = prolonged(own, &at.point, &program);
+        problem.choose_active_sets(&mut program, &shape);
+        let mesh = Mesh::of(&problem, &program);
+        let found = minimum_next_to_on(&problem, &mesh, &shape, proceed);
+        way.iterations += found.iterations;
+        let is_here = |solved: &Solved| solved.at.point.distance(&shape) <= SAME_BELT;
+        found.certified().is_ok_and(is_here).then_some(found)
+    }
+}
