@@ -124,6 +124,25 @@ def test_clamp_leaves_a_mobius_band_free_to_slide_along_itself() -> None:
     assert np.abs(sliding.bend[2:-2] - ratio * along).max() < 1e-6 * np.abs(ratio * along).max()
 
 
+def test_clamped_ring_has_one_spectrum_wherever_it_is_clamped() -> None:
+    """A circle that slides along itself is the same: no motion. Its first mode is that of a strip curved to a ring."""
+    rings = [solve(closed(0, [support(at, ORIGIN, ORIGIN)], elements=320)) for at in ("start", 0.3, 0.5)]
+    assert [counts(ring) for ring in rings] == [(True, 0, 0)] * 3
+    spectra = np.array([[mode.eigenvalue for mode in ring.modes(3)] for ring in rings])
+    np.testing.assert_allclose(spectra, spectra[[0, 0, 0]], rtol=1e-6)
+    ends = [support(at, ORIGIN, [0.0, 0.0, turn], square_rib=False) for at, turn in (("start", 0.0), ("end", math.tau))]
+    strip = solve(belt(ends, elements=320))
+    assert spectra[0, 0] == pytest.approx(strip.modes(1)[0].eigenvalue, rel=0.02)
+
+
+@pytest.mark.parametrize("place", [0.5, 0.495])
+def test_ring_between_two_pins_may_turn_about_them_alone(place: float) -> None:
+    """Where sliding keeps the pins' distance to first order, it does not beyond."""
+    ring = solve(closed(0, [support("start", ORIGIN), support(place, [0.0, 0.4, 0.0])]))
+    assert counts(ring) == (True, 0, 1)
+    assert ring.modes(2)[1].eigenvalue == pytest.approx(18400.0, rel=5e-3)
+
+
 def test_belt_that_hangs_from_a_point_may_turn_about_the_vertical_alone() -> None:
     hanging = board([straight(1.0, natural_bend=3.0)], [point("start", 0.0, 0.0, 0.0)], gravity=(0.0, 0.0, -10.0))
     hanging["belt"] |= {"density": 1.0, "poisson": 0.3}

@@ -119,6 +119,13 @@ def test_energy_holds_the_potential_of_the_weight(weight: float) -> None:
     assert potential < 0.0
 
 
+def test_weight_in_another_unit_is_no_energy_without_a_least_value() -> None:
+    """A clamped belt falls no farther than its length: the units are named instead."""
+    equilibrium = fb.solve(fb.Scenario.from_dict(heavy(1e12)))
+    assert equilibrium.status == "not_converged"
+    assert "the loads are 1e12 R_f/U² together; check their units" in equilibrium.message
+
+
 def test_weight_without_gravity_does_nothing() -> None:
     equilibrium = solve(cantilever(density=3.0))
     assert equilibrium.energy == pytest.approx(0.0, abs=1e-12)

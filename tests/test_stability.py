@@ -7,10 +7,12 @@ of mass in all, eigenvalues are squared natural frequencies.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import fishbone as fb
 from helpers import Energy, Json, arc, belt, board, clamped, example1, example2, solve, straight, support
@@ -249,6 +251,7 @@ def test_margin_to_a_fold_is_that_of_the_elastica() -> None:
     margin = solve(clamped((0.0, 0.6, 0.0))).snap_margin(direction=(0.0, 0.0, 0.0, 0.0, 0.0, -1.0), reach=1.5)
     assert margin is not None
     assert margin.snaps
+    assert margin.confirmed
     assert margin.distance == pytest.approx(1.1230897421, abs=1e-5)
     assert margin.rotation == pytest.approx([0.0, 0.0, -1.1230897421], abs=1e-5)
 
@@ -259,6 +262,23 @@ def test_margin_to_a_pitchfork_is_that_of_the_elastica() -> None:
     assert margin is not None
     assert not margin.snaps
     assert margin.distance == pytest.approx(0.6020976231, abs=1e-5)
+
+
+def test_loss_of_stability_of_the_mesh_alone_is_unconfirmed() -> None:
+    """Ribs of a twisted board turn over from element to element: led three times as far, the belt does not snap."""
+    segments = [straight(0.4), arc(0.1 * math.pi, 5.0), straight(0.4)]
+    end = {"at": "end", "position": [0.1, 0.5, 0.5], "euler": [0.0, 0.6, 0.5 * math.pi]}
+    equilibrium = solve(board(segments, [support("start", (0, 0, 0), (0, 0, 0)), end], width=0.08))
+    margin = equilibrium.snap_margin()
+    assert margin is not None
+    assert not margin.confirmed
+    tracker = fb.Tracker(equilibrium.scenario)
+    length, frame = equilibrium.u[-1], Rotation.from_matrix(equilibrium.frame[-1])
+    for share in np.linspace(0.0, 3.0, 31):
+        way = share * margin.distance * margin.direction
+        turned = Rotation.from_rotvec(way[3:]) * frame
+        update = tracker.update(equilibrium.position[-1] + length * way[:3], turned.as_rotvec())
+        assert (update.status, update.snapped) == ("converged", False)
 
 
 def test_nearest_margin_is_no_farther_than_along_any_axis() -> None:

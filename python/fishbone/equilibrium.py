@@ -136,6 +136,9 @@ class SnapMargin(NamedTuple):
     """Position of the support at that pose, shape (3,)."""
     rotation: Floats
     """Rotation vector of the support at that pose, shape (3,)."""
+    confirmed: bool
+    """Whether a mesh twice as fine loses its stability at much the same distance along the direction. A mesh may have
+    losses of its own where ribs turn over from element to element."""
 
 
 class HighestPoint(NamedTuple):
@@ -500,8 +503,8 @@ class Equilibrium:
         margin = self._inner.margin(self._support_index(support), along, reach)
         if margin is None:
             return None
-        distance, towards, is_fold, position, rotation = margin
-        return SnapMargin(distance, np.array(towards), is_fold, np.array(position), np.array(rotation))
+        distance, towards, is_fold, position, rotation, confirmed = margin
+        return SnapMargin(distance, np.array(towards), is_fold, np.array(position), np.array(rotation), confirmed)
 
     def sensitivity(self) -> Sensitivity:
         """The derivatives of the equilibrium by the parameters of the scenario; factorised at the first call.

@@ -138,12 +138,23 @@ def below_limit(diagram: Diagram, limit: float) -> str:
     where = f"{number(radius[least])} at {_along(diagram, places[least])}"
     if radius[least] >= limit:
         return f"no bend on the spine is tighter than the limit of {number(limit)}: the least radius is {where}"
-    broken = places[radius < limit]
-    first, last = (_along(diagram, place) for place in (broken.min(), broken.max()))
+    broken = [place for branch in diagram.branches for place in _crossings(branch, limit)]
+    first, last = (_along(diagram, place) for place in (min(broken), max(broken)))
     return (
         f"warning: the bend on the spine is tighter than the limit of {number(limit)} between {first} and {last}: "
         f"the least radius is {where}"
     )
+
+
+def _crossings(branch: Branch, limit: float) -> Iterator[float]:
+    """Where the least radius of a branch is below a limit, and where it crosses the limit between two states."""
+    place, radius = branch.parameter, branch.least_spine_radius
+    yield from place[radius < limit]
+    tightness = 1.0 / radius  # linear between states: a flat state has the radius infinity
+    for k in np.flatnonzero(np.diff((radius < limit).astype(int))):
+        share = (1.0 / limit - tightness[k]) / (tightness[k + 1] - tightness[k])
+        if np.isfinite(share):
+            yield float(place[k] + share * (place[k + 1] - place[k]))
 
 
 def _along(diagram: Diagram, parameter: float) -> str:

@@ -273,7 +273,9 @@ def _draw_gravity(axes: Axes, scene: Scene, view: View) -> None:
     else:
         points = view.page(scene.points)
         high, room = points.max(axis=0), np.ptp(points, axis=0)
-    reach *= min(1.0, 0.6 * float(room.min()) / max(float(np.linalg.norm(reach)), np.finfo(float).tiny))
+    length = float(np.linalg.norm(reach))
+    if length >= _HIDDEN_SHARE * scene.size:
+        reach *= min(1.0, 0.6 * float(room.min()) / length)
     if np.linalg.norm(reach) < _HIDDEN_SHARE * scene.size:
         return  # along the line of sight: the other views show it
     at = high - 0.08 * room - np.maximum(reach, 0.0)

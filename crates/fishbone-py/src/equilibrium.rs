@@ -51,7 +51,7 @@ impl Equilibrium {
 }
 
 /// Distance, direction, whether it is a fold, position and rotation vector.
-type Margin = (f64, [f64; 6], bool, [f64; 3], [f64; 3]);
+type Margin = (f64, [f64; 6], bool, [f64; 3], [f64; 3], bool);
 
 /// Eigenvalue, translation, rotation, bend and rib slope.
 type Mode<'py> = (f64, Points<'py>, Points<'py>, Scalars<'py>, Scalars<'py>);
@@ -414,8 +414,8 @@ impl Equilibrium {
         }
     }
 
-    /// (distance, direction, whether it is a fold, position, rotation vector) of the nearest loss of stability, along a
-    /// given direction or along any; None if there is none within reach.
+    /// (distance, direction, whether it is a fold, position, rotation vector, whether a finer mesh confirms it) of the nearest
+    /// loss of stability, along a given direction or along any; None if there is none within reach.
     ///
     /// Errors: `NoMargin`; those that a signal handler raises.
     #[pyo3(signature = (support, direction, reach))]
@@ -446,6 +446,7 @@ impl Equilibrium {
                 margin.is_fold,
                 array::row(&margin.position),
                 array::row(&margin.rotation),
+                margin.confirmed,
             )
         }))
     }

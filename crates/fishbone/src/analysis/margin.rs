@@ -26,6 +26,8 @@ pub struct Margin {
     pub position: Vector3<f64>,
     /// Rotation vector of the support there.
     pub rotation: Vector3<f64>,
+    /// Whether a mesh twice as fine loses its stability at much the same distance along the direction.
+    pub confirmed: bool,
 }
 
 /// Settings of the search for the nearest loss of stability: its extent, steps and tolerances.
@@ -133,7 +135,8 @@ impl Equilibrium {
     ) -> Result<Option<Margin>, NoMargin> {
         let direction = direction.normalize();
         let found = self.boundary(support, &direction, reach, settings, proceed)?;
-        Ok(found.map(|boundary| boundary.margin))
+        let margin = found.map(|boundary| boundary.margin);
+        Ok(margin.map(|margin| self.with_confirmation(support, margin, settings, proceed)))
     }
 
     /// The nearest loss of stability that a local search finds. The search starts from places along the six axes and along
@@ -190,9 +193,34 @@ impl Equilibrium {
         for boundary in found {
             margins.push(self.nearest_from(support, boundary, settings, proceed)?);
         }
-        Ok(margins
+        let nearest = margins
             .into_iter()
-            .min_by(|a, b| a.distance.total_cmp(&b.distance)))
+            .min_by(|a, b| a.distance.total_cmp(&b.distance));
+        Ok(nearest.map(|nearest| self.with_confirmation(support, nearest, settings, proceed)))
+    }
+
+    /// The margin, confirmed where the equilibrium on a mesh twice as fine has much the same along its direction.
+    fn with_confirmation(
+        &self,
+        support: usize,
+        margin: Margin,
+        settings: &MarginSettings,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Margin {
+        /// Difference of the distances, as a share of the distance.
+        const SAME: f64 = 0.1;
+        let elements = self.solved.as_ref().map(|s| s.program.elements().count());
+        let fine = elements.and_then(|count| self.refined(2 * count, proceed));
+        let far = (1.0 + SAME) * margin.distance;
+        let on_fine = fine.and_then(|fine| {
+            let found = fine.boundary(support, &margin.direction, far, settings, proceed);
+            found.ok().flatten()
+        });
+        let is_same = |other: &Boundary| other.margin.distance >= (1.0 - SAME) * margin.distance;
+        Margin {
+            confirmed: on_fine.as_ref().is_some_and(is_same),
+            ..margin
+        }
     }
 
     /// The nearest place found from a place on the boundary of stability by going on along its normal, until the normal is
@@ -324,6 +352,7 @@ impl Equilibrium {
                 is_fold: event.turn == Turn::Fold,
                 position: pose.position,
                 rotation: log(&pose.frame),
+                confirmed: false,
             },
             across,
         }))

@@ -294,11 +294,18 @@ fn judge(
     fault: Option<String>,
     redundant: Option<&str>,
 ) -> (Status, String) {
-    // An elastic energy has a least value: without loads, a search that finds none has gone astray.
+    // An elastic energy has a least value, and dead forces lead a belt that is held at a point no farther than its length: a
+    // search that finds none has gone astray.
+    let supports = &problem.scenario().supports;
+    let is_held = supports.iter().any(|support| support.point().is_some());
+    let is_turned = supports.iter().any(|support| support.moment.is_some());
+    let is_bounded = !program.is_loaded() || (is_held && !is_turned);
     let outcome = match solution.outcome {
-        Outcome::Unbounded if !program.is_loaded() => Outcome::Stalled,
+        Outcome::Unbounded if is_bounded => Outcome::Stalled,
         outcome => outcome,
     };
+    /// Load from which another unit is more likely than another bulge to help, in mean R_f/U².
+    const HEAVY: f64 = 1e8;
     let tolerance = problem.tolerance();
     let largest = solution.residuals.largest();
     let (iterations, violation) = (solution.iterations, solution.residuals.constraint);
@@ -339,6 +346,14 @@ fn judge(
             format!(
                 "no shape found that meets the supports, the nearest misses them by {violation:.1e} (lengths in U, \
                  angles in rad); move the supports closer, try another solver.bulge or more solver.elements"
+            ),
+        ),
+        Outcome::Stalled if program.total_load() > HEAVY => (
+            Status::NotConverged,
+            format!(
+                "no step improves the shape any more, largest residual {largest:.1e} after {iterations} iterations: the loads \
+                 are {:.0e} R_f/U\u{b2} together; check their units, and those of the belt",
+                program.total_load()
             ),
         ),
         Outcome::Stalled => {

@@ -18,6 +18,8 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
     /// Conditions whose rank is the same nearby leave a family of shapes of the same energy. Of others, as of pins on a line
     /// about which the belt may turn, a motion counts as a symmetry if all conditions stay as they are far along it.
     pub(super) fn find_symmetries(&self, point: &BeltPoint<F>) -> Vec<Motion<N>> {
+        /// Largest rate of a motion that is none but for the mesh: a ring that slides along itself turns on the spot.
+        const NONE: f64 = 1e-3;
         let mut kept = self.kept(point);
         if !kept.is_empty() && self.kept(&elsewhere(point)).len() != kept.len() {
             kept.retain(|parts| self.keeps_all_along(point, parts));
@@ -32,7 +34,8 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
             }
             motion
         };
-        kept.iter().map(motion).collect()
+        let is_motion = |motion: &Motion<N>| motion.iter().any(|rate| rate.amax() > NONE);
+        kept.iter().map(motion).filter(is_motion).collect()
     }
 
     /// The half turns of a belt that slides along itself in any pose; `None` of another belt.
@@ -149,9 +152,10 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
     }
 
     /// The motion of a belt along itself by a unit of length, where it is the same belt afterwards: every node takes on the
-    /// pose and the fields of the next.
+    /// pose and the fields of the next. Two places that are held keep their distance to first order at most.
     fn sliding(&self, point: &BeltPoint<F>) -> Option<Motion<N>> {
-        let sign = self.is_uniform_and_closed().then(|| self.seam_factor())??;
+        self.slides()?;
+        let sign = self.seam_factor()?;
         let lengths: Vec<f64> = self.pieces.iter().map(Piece::length).collect();
         let last = lengths.len();
         let rate = |k: usize| {
