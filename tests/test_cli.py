@@ -590,6 +590,17 @@ def test_follow_says_where_the_radius_is_below_its_limit_with_or_without_a_figur
     assert_one_line(run("follow", planar_file, *TURN, "--radius-limit", "0.01")[2], f"the least radius is {least}")
 
 
+@pytest.mark.parametrize("path", [("--pose", "0 0.5 0 0 0 30"), ("--to", "supports[1].rotation[2]=30")])
+def test_follow_warns_of_an_angle_in_degrees(run, planar_file, monkeypatch, path):
+    def stop(*_):
+        raise cli.NoEquilibrium("stopped before it is solved")
+
+    monkeypatch.setattr(cli, "_followed", stop)
+    warning = "the path turns a support to 30 rad, which is more than a turn: angles are in radians"
+    assert warning in run("follow", planar_file, *path)[2]
+    assert "radians" not in run("follow", planar_file, *TURN)[2]
+
+
 @pytest.mark.parametrize("elements", [None, 80])
 def test_follow_warns_of_a_mesh_that_is_too_coarse_for_the_path(run, elements):
     """A strip is pulled aside from its clamp, which bends it in a layer thinner than an element of 80."""

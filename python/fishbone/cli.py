@@ -303,6 +303,7 @@ def follow(  # noqa: PLR0913 - one for each option
     pictures = _pictures(figure, None)
     _spare(file, out)
     scenario = fishbone.load(file)
+    _warn_of_degrees(file, path)
     diagram = _followed(file, scenario, path, {"step": step, "states": states, "branches": branches, "snaps": snaps})
     # All contents are made before a file is written, so that a failure leaves no file behind.
     contents = {}
@@ -350,6 +351,21 @@ def _followed(
             # The branch computes and keeps its quantities at the first access.
             _ = branch.energy
     return diagram
+
+
+def _warn_of_degrees(file: Path, path: dict[str, Any] | fishbone.Poses) -> None:
+    """Prints that a path turns a support by more than a turn, as one in degrees would, if it does."""
+    if isinstance(path, fishbone.Poses):
+        turns = [rotation for _, rotation in path.poses]
+    else:
+        turns = [value for field, value in path.items() if ".rotation" in field or ".euler" in field]
+    largest = max((math.hypot(*(turn if isinstance(turn, list) else [turn])) for turn in turns), default=0.0)
+    if largest > math.tau * (1.0 + 1e-9):
+        click.echo(
+            f"fishbone: {file}: warning: the path turns a support to {largest:g} rad, which is more than a turn: "
+            "angles are in radians",
+            err=True,
+        )
 
 
 def _warn_of_coarse_mesh(file: Path, diagram: Diagram) -> None:

@@ -83,7 +83,7 @@ def report_diagram(diagram: Diagram) -> Group:
 
 def _left_out(events: Sequence[Event]) -> str:
     count = sum(not event.confirmed for event in events)
-    return f"{count} of {len(events)} events are left out that a finer mesh does not confirm: try more solver.elements"
+    return f"{count} of {len(events)} events are left out that a finer mesh does not confirm"
 
 
 FAR_BEYOND = 10.0
