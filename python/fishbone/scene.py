@@ -78,11 +78,14 @@ def draw_lit(axes: Axes, scene: Scene, viewer: ArrayLike) -> None:
 
 
 def _draw_triad(axes: Axes, scene: Scene, view: View) -> None:
-    """Draws the world's axes, left below the belt."""
+    """Draws the world's axes, to the left of the belt and no lower."""
     points = view.page(scene.points)
-    length = 0.12 * float(np.ptp(points, axis=0).max())
+    size = float(np.ptp(points, axis=0).max())
+    length = 0.12 * size
     tips = view.page(length * UNIT)
-    origin = points.min(axis=0) - np.minimum(tips.min(axis=0), 0.0) - 0.06 * np.ptp(points, axis=0).max()
+    left, low = points.min(axis=0)
+    right_of_it, below_it = 1.5 * np.maximum(tips[:, 0].max(), 0.0), 1.5 * np.minimum(tips[:, 1].min(), 0.0)
+    origin = np.array([left - right_of_it - 0.06 * size, low - below_it])
     for name, tip in zip(AXES, tips, strict=True):
         _draw_arrow(axes, origin, tip, {"arrowstyle": "-|>", "color": "0.3", "linewidth": 0.7}, length)
         axes.annotate(name, _xy(origin + 1.35 * tip), color="0.2", ha="center", va="center", fontstyle="italic")
