@@ -155,6 +155,24 @@ def test_nearly_taut_belt_hangs_as_a_catenary(slack: float, rigidity: float) -> 
     assert found.reaction("end").force[1] == pytest.approx(a, rel=1e-4)
 
 
+@pytest.mark.parametrize("slack", [1e-3, 1e-4, 1e-5, 1e-6])
+@pytest.mark.parametrize("yaw", [0.0, 0.3, 2.5])
+@pytest.mark.parametrize("rise", [0.0, 0.6, -1.0])
+def test_nearly_taut_belt_hangs_in_any_direction(slack: float, yaw: float, rise: float) -> None:
+    """Between pins of unequal height: sinh(x)/x = √(1 − (height/length)²) · length/span, x = weight · span / (2 H)."""
+    level, height = (1.0 - slack) * math.cos(rise), (1.0 - slack) * math.sin(rise)
+    ratio = math.sqrt(1.0 - height**2) / level
+    half = brentq(lambda x: np.sinh(x) / x - ratio, 1e-6, 5.0, xtol=1e-15)
+    tables = scenario(pins(1.0), loads={"gravity": [-1.0, 0.0, 0.0]}, solver={"bulge": [-1.0, 0.0, 0.0]})
+    tables["supports"][1]["position"] = [height, level * math.cos(yaw), level * math.sin(yaw)]
+    tables["belt"] |= {"rigidity": 1e-8, "density": 1.0, "width": 0.05}
+    found = solve(tables)
+    force = found.reaction("end").force
+    assert np.hypot(force[1], force[2]) == pytest.approx(0.5 * level / half, rel=1e-4)
+    assert force[1:] == pytest.approx(np.hypot(force[1], force[2]) * np.array([np.cos(yaw), np.sin(yaw)]), rel=1e-4)
+    assert found.stable is True
+
+
 @pytest.mark.parametrize("lean", [0.3, math.pi / 3, 2.0])
 @pytest.mark.parametrize("pull", [1e3, 1e5])
 def test_leaning_clamp_under_tension_bends_as_the_elastica(lean: float, pull: float) -> None:

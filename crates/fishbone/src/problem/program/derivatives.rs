@@ -5,7 +5,9 @@ use crate::geometry::{Pose, Twist, hat};
 use crate::strip::density::{Density, Derivatives, LANES, Loaded};
 use crate::strip::element::Element;
 use nalgebra::{Matrix3, Matrix3x6, Matrix6, SVector, Vector6};
-use stagewise::{Layout, Linearisation, Multipliers, NodeVector, Program, StageMatrix, Values};
+use stagewise::{
+    Layout, Linearisation, Multipliers, NodeVector, Program, Residuals, StageMatrix, Values,
+};
 
 impl<D: Density<F>, const F: usize, const N: usize> Program<6, F, N> for BeltProgram<D, F, N> {
     type Point = BeltPoint<F>;
@@ -136,6 +138,24 @@ impl<D: Density<F>, const F: usize, const N: usize> Program<6, F, N> for BeltPro
 
     fn rounding(&self, point: &BeltPoint<F>, node: usize) -> SVector<f64, F> {
         point.fields[node].abs() * f64::EPSILON
+    }
+
+    /// Under large forces rounding of the poses turns into moments: no search makes stationarity smaller.
+    fn judged(&self, residuals: Residuals, multipliers: &Multipliers) -> Residuals {
+        /// Force from which its rounding counts, in mean R_f/U².
+        const LARGE: f64 = 1e6;
+        /// Rounding of stationarity as a share of the largest force, dimensionless.
+        const ROUNDING: f64 = 20.0 * f64::EPSILON;
+        let forces = multipliers.equalities.iter().map(|force| force.abs());
+        let largest = forces.fold(self.total_load(), f64::max);
+        let rounding = match largest > LARGE {
+            true => ROUNDING * largest,
+            false => 0.0,
+        };
+        Residuals {
+            stationarity: (residuals.stationarity - rounding).max(0.0),
+            ..residuals
+        }
     }
 
     /// The mean square displacement of the board, in U², of uniform weight: a node carries half of both pieces beside it, as
