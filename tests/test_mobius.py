@@ -165,6 +165,14 @@ def test_band_keeps_three_half_turns(width: float, energy: float, hand: int) -> 
     assert band.energy == pytest.approx(energy, rel=2e-4)
 
 
+@pytest.mark.parametrize("width", [0.03, 0.02, 0.01, 0.007])
+def test_narrow_band_keeps_three_half_turns(width: float) -> None:
+    """From 0.05 down the energy falls by 50 V: narrower bands tend to a limit of 130.5."""
+    band = solve(board([straight(1.0)], [], closed=True, half_turns=3, width=width, energy="wunderlich"))
+    assert (band.half_turns, band.stable) == (3, True)
+    assert band.energy == pytest.approx(130.5 + 50.0 * width, rel=1e-3)
+
+
 @pytest.mark.parametrize("width", [0.1, 0.3, 0.4, 0.5])
 def test_wide_bands_converge_on_every_mesh(width: float) -> None:
     """The error of the energy falls with the square of the length of the elements."""

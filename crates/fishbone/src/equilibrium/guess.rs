@@ -144,9 +144,9 @@ pub(crate) fn folded_band(
     bulge: &Vector3<f64>,
 ) -> BeltPoint {
     /// Amplitude of the bend for each half turn, in rad/U.
-    const BEND: f64 = 3.0;
+    const BEND: f64 = 4.0;
     /// Amplitude of the rib slope, dimensionless.
-    const SLOPE: f64 = 1.2;
+    const SLOPE: f64 = 0.8;
     let turns = f64::from(half_turns);
     let fields =
         |u: f64| Vector2::new(BEND * turns.abs(), -SLOPE * turns.signum()) * (PI * turns * u).cos();
