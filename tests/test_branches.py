@@ -5,6 +5,7 @@ The scenario is the planar arch at 0.6, whose lowest equilibrium is known in clo
 
 from __future__ import annotations
 
+import math
 from itertools import combinations
 from types import SimpleNamespace
 
@@ -14,7 +15,7 @@ import pytest
 import fishbone as fb
 from conftest import FEW
 from fishbone.branches import _search
-from helpers import Elastica, belt, spine_at
+from helpers import Elastica, arc, belt, board, spine_at, straight, support
 
 SIDES = [np.diag(signs) for signs in ([1, 1, 1], [-1, 1, 1], [1, 1, -1], [-1, 1, -1])]
 """What takes clamps in line to themselves: nothing, two mirrors and half a turn."""
@@ -286,6 +287,19 @@ def test_a_start_may_have_fewer_points_than_the_mesh(arches, arch):
 def test_what_is_no_shape_is_no_start(arch, start, words):
     with pytest.raises(fb.InvalidArgument, match=f"start: .*{words}"):
         fb.solve(arch, start=start)
+
+
+def test_a_minimum_on_two_meshes_is_one() -> None:
+    """A twisted board with an arc: nearly level shapes stay apart on one finer mesh."""
+    segments = [straight(0.4), arc(0.1 * math.pi, 5.0), straight(0.4)]
+    end = {"at": "end", "position": [0.1, 0.5, 0.5], "euler": [0.0, 0.6, 0.5 * math.pi]}
+    twisted = board(segments, [support("start", [0, 0, 0], [0, 0, 0]), end], width=0.08)
+    minima = [shape for shape in fb.branches(fb.Scenario.from_dict(twisted)) if shape.stable]
+    assert len(minima) > 20
+    level = [pair for pair in combinations(minima, 2) if abs(pair[0].energy / pair[1].energy - 1.0) < 1e-3]
+    for pair in level:
+        fine = [shape.refined(1600) for shape in pair]
+        assert None in fine or abs(fine[0].energy / fine[1].energy - 1.0) > 1e-6
 
 
 @pytest.mark.full

@@ -372,8 +372,12 @@ impl<'a> Census<'a> {
         });
         self.enter(plain.clone());
         for equilibrium in refined {
-            let is_known = |known: &Equilibrium| settings.is_unresolved(known, &equilibrium);
-            if !self.found.iter().any(is_known) {
+            let proceed = &mut settings.budget(watch);
+            let mut is_known = |known: &Equilibrium| {
+                settings.is_unresolved(known, &equilibrium)
+                    || is_same_on_its_mesh(settings, known, &equilibrium, proceed)
+            };
+            if !self.found.iter().any(&mut is_known) {
                 self.enter(equilibrium);
             }
         }
@@ -430,6 +434,24 @@ fn on_finer_mesh(
     let change = (fine.energy - found.energy).abs();
     let is_level = change <= settings.like_level * settings.size(found);
     (is_level && found.displacement(&fine) <= settings.like_distance).then_some(fine)
+}
+
+/// Whether a minimum that is like a known one leads to it on its mesh. With a density that does not know the width
+/// it may, and be another one: such minima lie at the elements of their meshes.
+fn is_same_on_its_mesh(
+    settings: &SearchSettings,
+    known: &Equilibrium,
+    other: &Equilibrium,
+    proceed: &mut dyn FnMut() -> ControlFlow<()>,
+) -> bool {
+    let solved = known.solved.as_ref();
+    let knows_width = solved.is_some_and(|solved| solved.program.model.knows_width());
+    let are_minima = index(known) == 0 && index(other) == 0;
+    if !knows_width || !are_minima || !settings.is_like(known, other) {
+        return false;
+    }
+    let led_to = other.on_mesh_of(known, proceed);
+    led_to.is_some_and(|led_to| settings.is_same(known, &led_to))
 }
 
 /// The lowest modes of an equilibrium beside its symmetries, which lead to no other shape.

@@ -257,11 +257,31 @@ impl Equilibrium {
             return None;
         }
         let mesh = refinement::mesh_for_ribs_anywhere(&self.problem, &solved.program)?;
-        let program = self.problem.program_on(&mesh)?;
+        let found = self.minimum_on(&mesh, proceed)?;
+        (self.displacement(&found) <= NEXT).then_some(found)
+    }
+
+    /// The minimum to which this one leads on the mesh of another.
+    pub(crate) fn on_mesh_of(
+        &self,
+        other: &Self,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Option<Self> {
+        let mesh = Mesh::of(&self.problem, &other.solved.as_ref()?.program);
+        self.minimum_on(&mesh, proceed)
+    }
+
+    /// The minimum to which this one leads on another mesh; `None` if it leads to none.
+    fn minimum_on(
+        &self,
+        mesh: &Mesh,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Option<Self> {
+        let solved = self.solved.as_ref()?;
+        let program = self.problem.program_on(mesh)?;
         let shape = search::prolong(&solved.program, &solved.at.point, &program);
-        let found = minimum_next_to_on(&self.problem, &mesh, &shape, proceed);
-        let is_same = found.is_minimum() && self.displacement(&found) <= NEXT;
-        is_same.then_some(found)
+        let found = minimum_next_to_on(&self.problem, mesh, &shape, proceed);
+        found.is_minimum().then_some(found)
     }
 
     /// The same equilibrium, minimum or not, on a mesh of another number of elements; `None` if no equilibrium is found next
