@@ -59,6 +59,7 @@ def test_only_the_snap_of_the_belt_is_confirmed(opening):
     assert opening.angle(snap.parameter) == pytest.approx(SNAP, abs=0.3)
     assert snap.jump == pytest.approx(JUMP, rel=0.02)
     assert snap.released == pytest.approx(RELEASED, rel=0.1)
+    assert False not in branch.stable[: snap.state]
     # Where ribs turn over from element to element the mesh has folds of its own.
     assert sum(event.kind == "fold" for event in branch.events) > 1
 

@@ -177,8 +177,9 @@ class Branch:
     def stable(self) -> list[bool | None]:
         """Whether each state is a local minimum; None where not decided, as `Equilibrium.stable`.
 
-        It is not decided next to an event, and not always where a part of the belt is flat under load: there the slope
-        of the ribs costs no energy, and `negative_modes` does not include it.
+        It is not decided next to an event, and from an event that a finer mesh does not confirm to the one that brings
+        the number of negative modes back; nor always where a part of the belt is flat under load: there the slope of the
+        ribs costs no energy, and `negative_modes` does not include it.
         """
         return list(self._report.stable)
 

@@ -332,6 +332,24 @@ pub fn follow(
     Ok(diagram)
 }
 
+impl Branch {
+    /// Whether the number of negative modes of a state comes from an event that a finer mesh does not confirm, and that no other
+    /// event has undone.
+    fn is_in_doubt_at(&self, state: usize) -> bool {
+        let until = self.events.iter().take_while(|event| event.state <= state);
+        let doubted = until.fold(None, |doubted: Option<usize>, event| {
+            let [before, after] = event.negative_modes;
+            match doubted {
+                _ if event.confirmed => None,
+                None => (before != after).then_some(before),
+                // The state of the event itself may still be on either side.
+                Some(number) => (after != number || event.state == state).then_some(number),
+            }
+        });
+        doubted.is_some()
+    }
+}
+
 impl Summary {
     /// Whether the state is a local minimum; `None` where this is undecided.
     pub fn stable(&self) -> Option<bool> {
@@ -397,7 +415,8 @@ impl Diagram {
             least_spine_radius: surface::least_spine_radius(spine).map(|least| least.value),
             area_radii: surface::BendDistribution::of(spine).quantiles(),
             rib_margin: surface::rib_margin(spine).value,
-            stability: equilibrium.stability,
+            stability: (equilibrium.stability)
+                .filter(|_| !self.branches[branch].is_in_doubt_at(state)),
             status: equilibrium.status,
             residuals: equilibrium.residuals,
             error: equilibrium.error().and_then(|error| error.largest_known()),
