@@ -178,8 +178,8 @@ class Branch:
         """Whether each state is a local minimum; None where not decided, as `Equilibrium.stable`.
 
         It is not decided next to an event, and from an event that a finer mesh does not confirm to the one that brings
-        the number of negative modes back; nor always where a part of the belt is flat under load: there the slope of the
-        ribs costs no energy, and `negative_modes` does not include it.
+        the number of negative modes back; nor always where a part of the belt is flat under load: there the slope of
+        the ribs costs no energy, and `negative_modes` does not include it.
         """
         return list(self._report.stable)
 
