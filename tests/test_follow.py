@@ -302,7 +302,7 @@ def test_the_mesh_is_graded_anew_along_a_path_where_the_bend_gets_too_sharp_for_
 
 
 def test_a_fixed_mesh_tells_what_it_makes_of_a_path():
-    """The layer is thinner than an element: the radius is off, and the error tells by how much, to a factor of 3."""
+    """The layer is thinner than an element: the radius is off by the error, to a factor of 3."""
     branch = pulled(elements=80)
     true = branch.least_spine_radius / layer_radius(branch.parameter) - 1.0
     assert true[-1] > 0.5

@@ -158,7 +158,7 @@ def test_nearly_taut_belt_hangs_as_a_catenary(slack: float, rigidity: float) -> 
 @pytest.mark.parametrize("slack", [1e-3, 1e-4, 1e-5, 1e-6])
 @pytest.mark.parametrize("yaw", [0.0, 0.3, 2.5])
 @pytest.mark.parametrize("rise", [0.0, 0.6, -1.0])
-def test_nearly_taut_belt_hangs_in_any_direction(slack: float, yaw: float, rise: float) -> None:
+def test_belt_with_hardly_any_slack_hangs_in_any_direction(slack: float, yaw: float, rise: float) -> None:
     """Between pins of unequal height: sinh(x)/x = √(1 − (height/length)²) · length/span, x = weight · span / (2 H)."""
     level, height = (1.0 - slack) * math.cos(rise), (1.0 - slack) * math.sin(rise)
     ratio = math.sqrt(1.0 - height**2) / level

@@ -13,7 +13,7 @@ use crate::names::named;
 use crate::problem::program::{BeltPoint, BeltProgram};
 use crate::problem::{Mesh, Problem, Units};
 use crate::scenario::error::ScenarioError;
-use crate::scenario::{Scenario, SupportSpec};
+use crate::scenario::{Scenario, SegmentSpec, SupportSpec};
 use nalgebra::{Matrix3, Vector3};
 use stagewise::{Distance, FollowSettings, Follower, Program, Residuals, Solution};
 use std::ops::ControlFlow;
@@ -135,8 +135,8 @@ impl Tracker {
     ///
     /// Nothing is allocated where the equilibrium is followed on its mesh and the board has neither links nor bends. Unless the
     /// scenario fixes the mesh, its error is estimated where turning changes more within an element than before, and the belt
-    /// goes on on another mesh where this one carries it no more; the mesh of a slender belt is graded anew at every update. `proceed` is asked during the motion
-    /// whether to go on; `Break` leaves the tracker at its last pose.
+    /// goes on on another mesh where this one carries it no more; the mesh of a slender belt is graded anew at every update.
+    /// `proceed` is asked during the motion whether to go on; `Break` leaves the tracker at its last pose.
     ///
     /// # Errors
     ///
@@ -187,16 +187,26 @@ impl Tracker {
 
     /// Whether a pose is proved to be out of reach. The proof is only tried where the belt is nearly straight to another support.
     fn is_out_of_reach(&self, pose: &Pose) -> bool {
-        /// Distance over the length of the belt in between from which the proof is tried.
+        /// Distance over the flexible length of the belt in between from which the proof is tried.
         const NEARLY: f64 = 0.9;
         let Scenario { belt, supports, .. } = self.problem.scenario();
         let length = belt.length();
         let own = supports[self.support].at.arc_length(length);
+        let stiff = belt
+            .segments
+            .iter()
+            .filter(|s| matches!(s, SegmentSpec::Rigid { .. }));
+        let stiff: f64 = stiff.map(SegmentSpec::length).sum();
         let position = self.in_scenario(pose).position;
         let is_nearly_straight = |other: &SupportSpec| {
-            let between = (other.at.arc_length(length) - own).abs();
+            let way = (other.at.arc_length(length) - own).abs();
+            let between = if belt.closed {
+                way.min(length - way)
+            } else {
+                way
+            };
             let along = |k: usize| other.components()[k].map_or(0.0, |held| held - position[k]);
-            Vector3::from_fn(|k, _| along(k)).norm() > NEARLY * between
+            Vector3::from_fn(|k, _| along(k)).norm() > NEARLY * (between - stiff)
         };
         let mut others = supports.iter().enumerate();
         others.any(|(i, other)| i != self.support && is_nearly_straight(other))

@@ -184,7 +184,7 @@ impl Estimate {
     }
 }
 
-/// The largest error of a stationary point of a problem's programme that one Newton step on the finer mesh tells; infinite
+/// The largest error of a stationary point of a problem's programme by one Newton step on the finer mesh; infinite
 /// where there is no such step.
 pub(super) fn largest_error_by_a_step(
     problem: &Problem,

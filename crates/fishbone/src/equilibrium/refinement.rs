@@ -213,8 +213,8 @@ fn first_mesh(problem: &Problem) -> Mesh {
     Mesh::uniform(problem, FIRST).graded(problem, &lengths, &places)
 }
 
-/// Whether a mesh that follows the error carries a stationary point of a problem's programme well enough to be followed on it, as
-/// far as one Newton step on the mesh of elements half as long tells; a mesh that the scenario fixes carries all.
+/// Whether a mesh that follows the error carries a stationary point of a problem's programme well enough to be followed on it, by
+/// the estimate of one Newton step on the mesh of elements half as long; a mesh that the scenario fixes carries all.
 ///
 /// Every mesh is another discrete belt: the fewer the changes, the smoother the path.
 pub(crate) fn carries(

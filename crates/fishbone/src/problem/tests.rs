@@ -1,6 +1,7 @@
 use super::*;
 use crate::geometry::exp;
 use crate::scenario::{BeltSpec, Place, Rigidity, RigidityTable, SegmentSpec};
+use stagewise::{Multipliers, Program, Residuals};
 use std::f64::consts::PI;
 
 fn scenario() -> Scenario {
@@ -182,6 +183,32 @@ fn test_clamp_holds_all_of_a_pose() {
     let problem = Problem::new(scenario).unwrap();
     assert_eq!(problem.clamp(0).unwrap().position.x, 3.0);
     assert_eq!((problem.clamp(1), problem.clamp(2)), (None, None));
+}
+
+#[test]
+fn test_rounding_of_forces_hides_no_residual() {
+    let program = problem().program(16);
+    let of = |stationarity: f64, force: f64| {
+        let residuals = Residuals {
+            stationarity,
+            constraint: 0.0,
+            complementarity: 0.0,
+        };
+        let multipliers = Multipliers {
+            equalities: vec![-force; 12],
+            inequalities: Vec::new(),
+        };
+        program.judged(residuals, &multipliers).stationarity
+    };
+    assert_eq!(of(1.0, 1e5), 1.0);
+    assert!((1.0 - of(1.0, 1e9) - 4.44e-6).abs() < 1e-8);
+    assert!(of(1.0, 1e30) >= 0.999);
+    assert_eq!(of(1e-6, 1e9), 0.0);
+    assert!(
+        [1e5, 1e9, 1e30]
+            .iter()
+            .all(|force| of(f64::NAN, *force).is_nan())
+    );
 }
 
 #[test]

@@ -176,7 +176,7 @@ fn next_to(
     let (other, start) = family.on_mesh_that_carries(beyond, last, pace)?;
     let here = family.shape_on(last, &other)?;
     let is_here = start.at.point.distance(&here) <= SAME_BELT;
-    // Beside a fold one Newton step tells of an error on any mesh.
+    // Beside a fold the estimate by one Newton step is large on any mesh.
     let is_better = || other.carries(&start);
     (is_here && start.negative == last.negative && is_better()).then_some((other, start))
 }

@@ -146,14 +146,21 @@ impl<D: Density<F>, const F: usize, const N: usize> Program<6, F, N> for BeltPro
         const LARGE: f64 = 1e6;
         /// Rounding of stationarity as a share of the largest force, dimensionless.
         const ROUNDING: f64 = 20.0 * f64::EPSILON;
+        /// Most that counts as rounding, in mean R_f/U: multipliers grow without bound where a search goes astray.
+        const MOST: f64 = 1e-3;
         let forces = multipliers.equalities.iter().map(|force| force.abs());
         let largest = forces.fold(self.total_load(), f64::max);
         let rounding = match largest > LARGE {
-            true => ROUNDING * largest,
+            true => MOST.min(ROUNDING * largest),
             false => 0.0,
         };
+        // NaN stays NaN.
+        let stationarity = match residuals.stationarity <= rounding {
+            true => 0.0,
+            false => residuals.stationarity - rounding,
+        };
         Residuals {
-            stationarity: (residuals.stationarity - rounding).max(0.0),
+            stationarity,
             ..residuals
         }
     }
