@@ -9,8 +9,7 @@ use fishbone::analysis::tracking::NoTracker;
 use fishbone::equilibrium::Status;
 use fishbone::names::Named;
 use fishbone::scenario::error::ScenarioError;
-use fishbone::scenario::{Axis, Method};
-use fishbone::strip::developable::EnergyModel;
+use fishbone::scenario::{Axis, EnergyModel, Method};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 

@@ -24,6 +24,8 @@ pub struct Layout {
     inequalities_between: Vec<Block<[usize; 2]>>,
     /// Weight of every inequality in the barrier.
     row_weights: Vec<f64>,
+    /// Weight of every control of a node in damping; empty where all are 1.
+    control_weights: Vec<f64>,
 }
 
 impl Layout {
@@ -38,6 +40,7 @@ impl Layout {
             inequalities_at: Vec::new(),
             inequalities_between: Vec::new(),
             row_weights: Vec::new(),
+            control_weights: Vec::new(),
         }
     }
 
@@ -76,6 +79,18 @@ impl Layout {
         }
         assert_eq!(self.stage_rows.len(), self.nodes());
         self
+    }
+
+    /// Weighs every control of a node in damping: by the inverse square of the size that counts as one. By default all weigh 1.
+    #[must_use]
+    pub fn with_control_weights(mut self, weights: Vec<f64>) -> Self {
+        self.control_weights = weights;
+        self
+    }
+
+    /// Weight of a node's control in damping.
+    pub(crate) fn control_weight(&self, control: usize) -> f64 {
+        self.control_weights.get(control).copied().unwrap_or(1.0)
     }
 
     /// Adds inequalities of a node's state and controls, with their weight in the barrier.

@@ -8,6 +8,7 @@
 
 mod settings;
 mod starts;
+mod thick;
 mod trails;
 
 pub use settings::{SearchSettings, Wave};
@@ -56,6 +57,9 @@ pub fn branches(
     run: &Run,
     watch: &dyn Watch,
 ) -> Vec<Equilibrium> {
+    if problem.is_of_shell() {
+        return thick::branches_of_thick(problem, settings, run, watch);
+    }
     let proceed = &mut || watch.proceed();
     let plain = crate::solve::solve(problem, proceed);
     let is_intrinsic = problem.scenario().solver.method == Method::Intrinsic;
@@ -401,7 +405,7 @@ fn facing(
 ) -> Option<Equilibrium> {
     /// Mirrors, as signs of bend and of rib slope, dimensionless.
     const MIRRORS: [[f64; 2]; 3] = [[-1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]];
-    let solved = found.solved.as_ref()?;
+    let solved = found.developable()?;
     let stable = found.stability.is_none_or(|s| s.negative_modes == 0);
     let mirrored = MIRRORS
         .into_iter()
@@ -429,7 +433,7 @@ fn on_finer_mesh(
     found: &Equilibrium,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Option<Equilibrium> {
-    let elements = found.solved.as_ref()?.program.elements().count();
+    let elements = found.developable()?.program.elements().count();
     let fine = found.refined(settings.refinement * elements, proceed)?;
     let change = (fine.energy - found.energy).abs();
     let is_level = change <= settings.like_level * settings.size(found);
@@ -444,7 +448,7 @@ fn is_same_on_its_mesh(
     other: &Equilibrium,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> bool {
-    let solved = known.solved.as_ref();
+    let solved = known.developable();
     let knows_width = solved.is_some_and(|solved| solved.program.model.knows_width());
     let are_minima = index(known) == 0 && index(other) == 0;
     if !knows_width || !are_minima || !settings.is_like(known, other) {
@@ -456,7 +460,7 @@ fn is_same_on_its_mesh(
 
 /// The lowest modes of an equilibrium beside its symmetries, which lead to no other shape.
 fn lowest_modes(equilibrium: &Equilibrium, count: usize) -> Vec<Mode> {
-    let Some(solved) = equilibrium.solved.as_ref().filter(|_| count > 0) else {
+    let Some(solved) = equilibrium.developable().filter(|_| count > 0) else {
         return Vec::new();
     };
     let symmetries = solved.inertia.map_or(0, |inertia| inertia.symmetries);
@@ -496,7 +500,7 @@ fn new_minimum_from(
 
 /// Shapes of a minimum displaced far along its lowest modes.
 fn perturbed(settings: &SearchSettings, minimum: &Equilibrium) -> Vec<BeltPoint> {
-    let Some(solved) = &minimum.solved else {
+    let Some(solved) = minimum.developable() else {
         return Vec::new();
     };
     let modes = lowest_modes(minimum, settings.perturbed_modes);
@@ -516,7 +520,7 @@ fn beyond_modal_load(
     forth: bool,
     watch: &dyn Watch,
 ) -> Vec<Equilibrium> {
-    let Some(solved) = &from.solved else {
+    let Some(solved) = from.developable() else {
         return Vec::new();
     };
     let program = &solved.program;

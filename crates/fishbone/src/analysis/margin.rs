@@ -209,7 +209,7 @@ impl Equilibrium {
     ) -> Margin {
         /// Difference of the distances, as a share of the distance.
         const SAME: f64 = 0.1;
-        let elements = self.solved.as_ref().map(|s| s.program.elements().count());
+        let elements = self.developable().map(|s| s.program.elements().count());
         let fine = elements.and_then(|count| self.refined(2 * count, proceed));
         let far = (1.0 + SAME) * margin.distance;
         let on_fine = fine.and_then(|fine| {

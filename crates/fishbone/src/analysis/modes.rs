@@ -1,10 +1,10 @@
 //! Modes: eigenvectors of the second variation of the energy at an equilibrium.
 
 use crate::analysis::sensitivity::Motion;
-use crate::equilibrium::{Equilibrium, Uncertified, left_free};
+use crate::equilibrium::{AnySolved, Equilibrium, Solved, Uncertified, left_free};
 use crate::names::named;
-use crate::problem::program::DevelopableNode as NodeVector;
-use stagewise::Singular;
+use crate::strip::density::Density;
+use stagewise::{NodeVector, Singular};
 use thiserror::Error;
 
 /// A motion of the belt from an equilibrium, one of the lowest of a set that the second variation does not couple; in the
@@ -49,7 +49,17 @@ impl Equilibrium {
     ///
     /// [`NoModes`] unless the solve has converged.
     pub fn modes(&self, count: usize) -> Result<Vec<Mode>, NoModes> {
-        let solved = self.certified()?;
+        match self.certified_any()? {
+            AnySolved::Developable(solved) => self.modes_of(solved, count),
+            AnySolved::Shell(solved) => self.modes_of(solved, count),
+        }
+    }
+
+    fn modes_of<D: Density<F>, const F: usize, const N: usize>(
+        &self,
+        solved: &Solved<D, F, N>,
+        count: usize,
+    ) -> Result<Vec<Mode>, NoModes> {
         let (program, mut at) = match left_free(&self.problem, &solved.program, &solved.at) {
             Some(free) => free,
             None => (solved.program.clone(), solved.at.clone()),
@@ -57,7 +67,7 @@ impl Equilibrium {
         let modes = stagewise::lowest_modes(&program, &mut at, count);
         let units = self.problem.units();
         let length = units.length;
-        let of_node = |node: usize, motion: &NodeVector| {
+        let of_node = |node: usize, motion: &NodeVector<N>| {
             let rotation = motion.fixed_rows::<3>(3).into_owned();
             let position = solved.at.point.poses[node].position;
             Motion {
@@ -65,7 +75,7 @@ impl Equilibrium {
                 rotation: rotation / length,
             }
         };
-        let mode = |mode: stagewise::Mode<8>| {
+        let mode = |mode: stagewise::Mode<N>| {
             let nodes = mode.motion.iter();
             Mode {
                 eigenvalue: mode.eigenvalue * units.energy / length.powi(2),

@@ -27,6 +27,8 @@ pub(crate) struct Laminate {
     pub neutral: f64,
     /// Flexural rigidity per width, D₁₁. Units: N·m.
     pub rigidity: f64,
+    /// Stretching stiffness along the strip per width, E h of a sheet: free to contract across. Units: N/m.
+    pub stretching: f64,
     /// Effective Poisson's ratio of bending, D₁₂/D₁₁.
     pub poisson: f64,
     /// Mass per area, where every layer's density is known. Units: kg/m².
@@ -134,9 +136,15 @@ impl Laminate {
             rigidity += stretch(layer) * arm;
             coupling += layer.material.poisson * stretch(layer) * arm;
         }
+        let contraction = |layer: &Layer| layer.material.poisson * stretch(layer);
+        let [along, across]: [f64; 2] = [
+            layers.iter().map(stretch).sum(),
+            layers.iter().map(contraction).sum(),
+        ];
         Self {
             neutral,
             rigidity,
+            stretching: along - across * across / along,
             poisson: coupling / rigidity,
             mass: layers.iter().map(Layer::mass).sum(),
         }

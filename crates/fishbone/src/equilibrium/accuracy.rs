@@ -5,6 +5,7 @@ use super::search::{Search, prolonged, prolonged_with_multipliers};
 use crate::problem::program::{BeltPoint, BeltProgram, Piece, Undetermined};
 use crate::problem::{Mesh, Problem};
 use crate::scenario::SAME_PLACE;
+use crate::strip::density::Density;
 use crate::strip::element::Element;
 use crate::strip::spine::Spine;
 use crate::surface::least_spine_radius;
@@ -56,12 +57,12 @@ impl MeshError {
     }
 
     /// Whether no error is infinite.
-    fn is_finite(&self) -> bool {
+    pub(super) fn is_finite(&self) -> bool {
         let errors = [self.energy, self.position, self.force, self.radius];
         !errors.into_iter().any(f64::is_infinite)
     }
 
-    fn times(&self, factor: f64) -> Self {
+    pub(super) fn times(&self, factor: f64) -> Self {
         Self {
             energy: factor * self.energy,
             position: factor * self.position,
@@ -310,7 +311,7 @@ fn is_next_to(found: &Solution<BeltPoint>, point: &BeltPoint) -> bool {
 type Wrench = (Vector3<f64>, Vector3<f64>);
 
 /// The quantities of which the error is estimated.
-struct Quantities {
+pub(super) struct Quantities {
     /// Total potential with its zero at the programme's origin, in mean R_f/U.
     energy: f64,
     /// Difference between the total potential with its zero at the belt's start and the energy, in mean R_f/U.
@@ -332,10 +333,10 @@ struct Quantities {
 }
 
 impl Quantities {
-    fn of(
+    pub(super) fn of<D: Density<F>, const F: usize, const N: usize>(
         problem: &Problem,
-        program: &BeltProgram,
-        point: &BeltPoint,
+        program: &BeltProgram<D, F, N>,
+        point: &BeltPoint<F>,
         equalities: &[f64],
         objective: f64,
     ) -> Self {
@@ -382,7 +383,7 @@ impl Quantities {
     }
 
     /// By how much these are off better ones on a mesh that has all their nodes, relative.
-    fn off(&self, better: &Self) -> MeshError {
+    pub(super) fn off(&self, better: &Self) -> MeshError {
         let same = SAME_PLACE * self.spine.length();
         let mut there = better.spine.u.iter().zip(&better.spine.pose);
         let nodes = self.spine.u.iter().zip(&self.spine.pose);

@@ -16,7 +16,7 @@ pub(super) fn out_of_flat(
     /// Displacements along the mode from which the belt falls, root mean square over the board, in U.
     const OFF: [f64; 4] = [0.05, -0.05, 0.2, -0.2];
     let is_unstable = found.stable() == Some(false);
-    let Some(solved) = found.solved.as_ref().filter(|s| s.is_flat && is_unstable) else {
+    let Some(solved) = found.developable().filter(|s| s.is_flat && is_unstable) else {
         return found;
     };
     let (problem, program) = (&found.problem, &solved.program);

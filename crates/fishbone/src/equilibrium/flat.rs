@@ -215,8 +215,8 @@ mod tests {
     use super::*;
     use crate::equilibrium::guess::guess;
     use crate::problem::Problem;
+    use crate::scenario::EnergyModel;
     use crate::scenario::{BeltSpec, Component, Place, Scenario, SegmentSpec, SupportSpec};
-    use crate::strip::developable::EnergyModel;
     use stagewise::{Settings, minimise};
     use std::ops::ControlFlow;
 

@@ -435,7 +435,7 @@ mod tests {
     use super::*;
     use crate::problem::program::Hold;
     use crate::problem::program::Piece;
-    use crate::strip::developable::EnergyModel;
+    use crate::strip::developable::DevelopableEnergy;
     use crate::strip::element::Curl;
     use crate::strip::element::Element;
 
@@ -457,9 +457,13 @@ mod tests {
             rigidity: [1.0; 2],
             half_width: 0.05,
             curl: Curl::default(),
+            stretching: f64::INFINITY,
         };
-        BeltProgram::new(vec![Piece::Strip(element); 40], EnergyModel::Wunderlich)
-            .with_supports(supports)
+        BeltProgram::new(
+            vec![Piece::Strip(element); 40],
+            DevelopableEnergy::Wunderlich,
+        )
+        .with_supports(supports)
     }
 
     fn end(point: &BeltPoint) -> Vector3<f64> {
@@ -541,6 +545,7 @@ mod tests {
                 rigidity: [1.0; 2],
                 half_width: 0.05,
                 curl: Curl::default(),
+                stretching: f64::INFINITY,
             };
             pieces.extend([Piece::Strip(element); 40]);
         }
@@ -551,7 +556,7 @@ mod tests {
         for support in &mut supports {
             support.square_rib = true;
         }
-        BeltProgram::new(pieces, EnergyModel::Wunderlich).with_supports(supports)
+        BeltProgram::new(pieces, DevelopableEnergy::Wunderlich).with_supports(supports)
     }
 
     #[test]

@@ -44,7 +44,7 @@ pub(super) fn brought_back(
         let far = beside_the_guess(&farther, proceed);
         far.is_minimum().then_some((farther, far, lift))
     })?;
-    let solved = far.solved.as_ref()?;
+    let solved = far.developable()?;
     let mesh = Mesh::of(&farther, &solved.program);
     let on_mesh = |problem: &Problem| {
         let mut program = problem.program_on(&mesh)?;

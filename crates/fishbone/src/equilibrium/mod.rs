@@ -6,9 +6,11 @@ mod buckled;
 mod flat;
 pub(crate) mod guess;
 mod intrinsic;
+mod judged;
 mod lifted;
 mod refinement;
 mod search;
+pub(crate) mod shell;
 mod side;
 mod sliding;
 mod spans;
@@ -25,6 +27,8 @@ use crate::geometry::{Pose, Wrench};
 use crate::problem::program::{BeltPoint, BeltProgram};
 use crate::problem::{Mesh, Problem};
 use crate::scenario::{SAME_PLACE, Scenario};
+use crate::strip::developable::DevelopableEnergy;
+use crate::strip::shell::{FIELDS, Shell};
 use crate::strip::spine::Spine;
 use crate::surface::{HighestPoint, highest_point};
 use accuracy::Estimate;
@@ -108,7 +112,7 @@ pub struct Equilibrium {
     /// The error by the mesh, once it has been estimated.
     pub(crate) error: OnceLock<Option<MeshError>>,
     /// The solved programme; `None` where the method has no multipliers.
-    pub(crate) solved: Option<Solved>,
+    pub(crate) solved: Option<AnySolved>,
 }
 
 /// The reason why a result has no modes, no derivatives and no continuation.
@@ -128,18 +132,33 @@ pub enum Uncertified {
         /// How the solve ended.
         message: String,
     },
+    /// The computation knows developable belts only.
+    #[error(
+        "energy = \"shell\" has no path, tracker, sensitivity or snap margin: use energy = \"wunderlich\""
+    )]
+    Shell,
 }
 
 named!(impl Uncertified {
     NoMultipliers = "no_multipliers",
     NotConverged = "not_converged",
+    Shell = "shell",
 });
+
+/// The solved programme of a belt.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum AnySolved {
+    /// Of a developable belt.
+    Developable(Box<Solved>),
+    /// Of a strip of finite thickness.
+    Shell(Box<Solved<Shell, FIELDS, 12>>),
+}
 
 /// A programme and its solution.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Solved {
-    pub(crate) program: BeltProgram,
-    pub(crate) at: Stationary<BeltPoint>,
+pub(crate) struct Solved<D = DevelopableEnergy, const F: usize = 2, const N: usize = 8> {
+    pub(crate) program: BeltProgram<D, F, N>,
+    pub(crate) at: Stationary<BeltPoint<F>>,
     pub(crate) values: Values,
     pub(crate) inertia: Option<Inertia>,
     /// The supports and links whose constraints are redundant, by name.
@@ -170,7 +189,10 @@ impl Equilibrium {
     /// has not converged by a method with multipliers, and where that mesh has no equilibrium next to this one.
     pub fn error(&self) -> Option<MeshError> {
         *self.error.get_or_init(|| {
-            let solved = self.certified().ok()?;
+            let solved = match self.certified_any().ok()? {
+                AnySolved::Developable(solved) => solved,
+                AnySolved::Shell(solved) => return shell::error(&self.problem, solved),
+            };
             let estimate = Estimate::new(
                 &self.problem,
                 &solved.program,
@@ -190,6 +212,22 @@ impl Equilibrium {
     ///
     /// [`Uncertified`] otherwise.
     pub(crate) fn certified(&self) -> Result<&Solved, Uncertified> {
+        match self.certified_any()? {
+            AnySolved::Developable(solved) => Ok(solved),
+            AnySolved::Shell(_) => Err(Uncertified::Shell),
+        }
+    }
+
+    /// The programme of a developable belt and its solution, converged or not.
+    pub(crate) fn developable(&self) -> Option<&Solved> {
+        match self.solved.as_ref()? {
+            AnySolved::Developable(solved) => Some(solved),
+            AnySolved::Shell(_) => None,
+        }
+    }
+
+    /// As [`Self::certified`], of any density.
+    pub(crate) fn certified_any(&self) -> Result<&AnySolved, Uncertified> {
         let solved = self.solved.as_ref().ok_or(Uncertified::NoMultipliers)?;
         match self.status {
             Status::Converged => Ok(solved),
@@ -207,7 +245,7 @@ impl Equilibrium {
     /// The programme and its solution, if this is an equilibrium of its mesh, be it one of the belt or not.
     pub(crate) fn solved_on_mesh(&self) -> Option<&Solved> {
         let is_converged = self.status == Status::Converged;
-        let solved = self.solved.as_ref();
+        let solved = self.developable();
         solved.filter(|solved| is_converged || solved.is_of_mesh_alone)
     }
 
@@ -238,7 +276,7 @@ impl Equilibrium {
         problem: &Problem,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Option<Self> {
-        let solved = self.solved.as_ref()?;
+        let solved = self.developable()?;
         let is_minimum = self.stability.is_none_or(|s| s.negative_modes == 0);
         if problem.has_fixed_mesh() || !is_minimum {
             return None;
@@ -252,7 +290,7 @@ impl Equilibrium {
     /// turn. `None` where the scenario fixes the mesh, of a saddle, of a belt so slender that such a mesh has too many
     /// elements, and where no minimum is found next to this one.
     pub(crate) fn for_paths(&self, proceed: &mut dyn FnMut() -> ControlFlow<()>) -> Option<Self> {
-        let solved = self.solved.as_ref()?;
+        let solved = self.developable()?;
         if self.problem.has_fixed_mesh() || !self.is_minimum() {
             return None;
         }
@@ -267,7 +305,7 @@ impl Equilibrium {
         other: &Self,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Option<Self> {
-        let mesh = Mesh::of(&self.problem, &other.solved.as_ref()?.program);
+        let mesh = Mesh::of(&self.problem, &other.developable()?.program);
         self.minimum_on(&mesh, proceed)
     }
 
@@ -277,7 +315,7 @@ impl Equilibrium {
         mesh: &Mesh,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Option<Self> {
-        let solved = self.solved.as_ref()?;
+        let solved = self.developable()?;
         let program = self.problem.program_on(mesh)?;
         let shape = search::prolong(&solved.program, &solved.at.point, &program);
         let found = minimum_next_to_on(&self.problem, mesh, &shape, proceed);
@@ -296,7 +334,10 @@ impl Equilibrium {
         /// Displacement of nodes up to which the refined shape is the same equilibrium, in U.
         const NEAR: f64 = 0.05;
         let problem = self.problem.with_elements(elements).ok()?;
-        let found = self.led_to(&problem, proceed)?;
+        let found = match problem.is_of_shell() {
+            true => from_guess(&problem, proceed),
+            false => self.led_to(&problem, proceed)?,
+        };
         let is_same = found.status == Status::Converged && self.displacement(&found) <= NEAR;
         is_same.then_some(found)
     }
@@ -308,7 +349,7 @@ impl Equilibrium {
         problem: &Problem,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Option<Self> {
-        let solved = self.solved.as_ref()?;
+        let solved = self.developable()?;
         let program = problem.program(problem.elements());
         let shape = search::prolong(&solved.program, &solved.at.point, &program);
         if self.stability.is_none_or(|s| s.negative_modes == 0) {
@@ -382,7 +423,8 @@ enum Start<'a> {
     Downhill(&'a Mesh, &'a BeltPoint),
 }
 
-/// The equilibrium of a problem: found from the guess, followed from a quarter turn where supports are turned by more than
+/// The equilibrium of a problem: of a strip of finite thickness next to that of the developable one; of a developable one
+/// found from the guess, followed from a quarter turn where supports are turned by more than
 /// half a turn, or brought back from a larger lift where supports hold a board nearly in its flat shape.
 ///
 /// `proceed` is asked once an iteration whether to go on.
@@ -390,6 +432,9 @@ pub(crate) fn from_guess(
     problem: &Problem,
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Equilibrium {
+    if problem.is_of_shell() {
+        return shell::solve(problem, proceed);
+    }
     match winding::wound(problem, proceed) {
         Some(found) => found,
         None => lifted::brought_back(problem, proceed)
@@ -439,6 +484,11 @@ pub(crate) fn from_fields(
     rib_slope: &[f64],
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Equilibrium {
+    if problem.is_of_shell() {
+        let developable = shell::as_developable(problem);
+        let found = from_fields(&developable, bend, rib_slope, proceed);
+        return shell::next_to(problem, found, proceed);
+    }
     let program = problem.program(problem.elements());
     let guess = guess(&program, &problem.bulge());
     let length = problem.units().length;

@@ -179,7 +179,7 @@ pub(super) fn wound_on_side_of_bulge(
 
 /// The solution of a minimum, and whether the belt is open and held at two places or more.
 fn solved_minimum(found: &Equilibrium) -> Option<(&Solved, bool)> {
-    let solved = found.solved.as_ref().filter(|_| found.is_minimum())?;
+    let solved = found.developable().filter(|_| found.is_minimum())?;
     let is_open = solved.program.half_turns.is_none();
     Some((solved, is_open && held_nodes(&solved.program).len() > 1))
 }

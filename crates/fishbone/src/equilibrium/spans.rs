@@ -169,6 +169,7 @@ fn scaled(piece: &Piece, unit: f64) -> Piece {
                 bend: element.curl.bend * unit,
                 ..element.curl
             },
+            stretching: element.stretching * unit * unit,
             ..element
         }),
         Piece::Rigid { length } => Piece::Rigid {

@@ -3,6 +3,7 @@
 use super::{Equilibrium, flat};
 use crate::problem::Problem;
 use crate::problem::program::{BeltPoint, BeltProgram, ROWS};
+use crate::strip::density::Density;
 use nalgebra::{Vector2, Vector3};
 use stagewise::{Inertia, Outcome, Solution, Stationary, assess};
 
@@ -112,11 +113,11 @@ impl From<Inertia> for Stability {
 
 /// The programme and its solution without the support at rest, if nothing else holds or loads the belt: that support only
 /// chooses one of equal poses, and bears nothing.
-pub(crate) fn left_free(
+pub(crate) fn left_free<D: Density<F>, const F: usize, const N: usize>(
     problem: &Problem,
-    program: &BeltProgram,
-    at: &Stationary<BeltPoint>,
-) -> Option<(BeltProgram, Stationary<BeltPoint>)> {
+    program: &BeltProgram<D, F, N>,
+    at: &Stationary<BeltPoint<F>>,
+) -> Option<(BeltProgram<D, F, N>, Stationary<BeltPoint<F>>)> {
     let scenario = problem.scenario();
     let is_held = !scenario.supports.is_empty() || !scenario.links.is_empty();
     if is_held || program.is_loaded() {

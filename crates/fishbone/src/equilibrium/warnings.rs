@@ -87,7 +87,7 @@ fn no_strip(belt: &BeltSpec) -> Option<String> {
     /// Thickness from which a belt is no thin strip, in V.
     const THICK: f64 = 0.25;
     let (length, width) = (belt.length(), belt.width);
-    let thick = belt.thickness().filter(|t| *t > THICK * width);
+    let thick = belt.thickness_value().filter(|t| *t > THICK * width);
     let thick = thick.map(|thickness| {
         format!(
             "a belt {} thick and {} wide is no thin strip: thicknesses are in the unit of length of the rest",
@@ -118,7 +118,7 @@ fn hardly_metres(belt: &BeltSpec) -> Option<String> {
     /// Force scale R_f/U² from which a belt is stiffer than thin sheets are. Units: N.
     const STIFF: f64 = 1e3;
     let rigidity = belt.own_rigidity().filter(|_| belt.is_in_si_units())?;
-    let (length, width, thickness) = (belt.length(), belt.width, belt.thickness()?);
+    let (length, width, thickness) = (belt.length(), belt.width, belt.thickness_value()?);
     let force = rigidity / (length * length);
     let is_large = length > LONG || width > WIDE || thickness > THICK;
     (is_large || length > SLIGHT * thickness || force > STIFF).then(|| {

@@ -242,7 +242,7 @@ fn settled(
         if found.status == Status::Converged {
             break;
         }
-        let Some(shape) = found.solved.as_ref().map(|solved| solved.at.point.clone()) else {
+        let Some(shape) = found.developable().map(|solved| solved.at.point.clone()) else {
             break;
         };
         let iterations = found.iterations;

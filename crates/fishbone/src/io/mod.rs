@@ -12,8 +12,7 @@ mod tests {
     use crate::analysis::path::Motion;
     use crate::equilibrium::Status;
     use crate::names::Named;
-    use crate::scenario::{Axis, Method};
-    use crate::strip::developable::EnergyModel;
+    use crate::scenario::{Axis, EnergyModel, Method};
     use serde::Serialize;
 
     /// Checks that all names differ, and that serde writes each name.

@@ -2,8 +2,8 @@
 
 use crate::equilibrium::{Equilibrium, LinkForce, MeshError, Status};
 use crate::geometry::Wrench;
+use crate::scenario::EnergyModel;
 use crate::scenario::Scenario;
-use crate::strip::developable::EnergyModel;
 use crate::surface;
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;

@@ -7,7 +7,8 @@ use crate::problem::program::{
     self, BeltPoint, BeltProgram, DeadForce, Hold, NodeLink, NodeLoad, NodeSupport, Tie,
 };
 use crate::scenario::{Axis, Place, SAME_PLACE, SupportSpec};
-use crate::strip::spine::{Piece, Spine};
+use crate::strip::density::Density;
+use crate::strip::spine::{CurvedRibs, Piece, Spine};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use std::f64::consts::PI;
 
@@ -26,9 +27,9 @@ impl Problem {
         self.belt.divided(count, &self.breaks())
     }
 
-    /// The stretches of the belt, divided as in a programme.
-    pub(super) fn division_of(&self, program: &BeltProgram) -> Vec<Division> {
-        self.belt.division_of(&program.pieces, &self.breaks())
+    /// The stretches of the belt, divided into the pieces of a programme.
+    pub(super) fn division_of(&self, pieces: &[program::Piece]) -> Vec<Division> {
+        self.belt.division_of(pieces, &self.breaks())
     }
 
     /// Lengths of the stretches of the belt, in U.
@@ -43,7 +44,7 @@ impl Problem {
     }
 
     fn program_of(&self, pieces: Vec<program::Piece>) -> BeltProgram {
-        let mut bare = BeltProgram::new(pieces, self.scenario.energy);
+        let mut bare = BeltProgram::new(pieces, self.scenario.energy.developable());
         bare.half_turns = self.belt.half_turns;
         let places = Places::of(&bare);
         let mut supports: Vec<_> = self
@@ -67,7 +68,11 @@ impl Problem {
     }
 
     /// The spine of a shape of one of the problem's programmes, in the units of the scenario.
-    pub(crate) fn spine(&self, program: &BeltProgram, point: &BeltPoint) -> Spine {
+    pub(crate) fn spine<D: Density<F>, const F: usize, const N: usize>(
+        &self,
+        program: &BeltProgram<D, F, N>,
+        point: &BeltPoint<F>,
+    ) -> Spine {
         let length = self.units.length;
         let pose = |pose: &Pose| Pose {
             frame: pose.frame,
@@ -89,6 +94,10 @@ impl Problem {
             pose: point.poses.iter().map(pose).collect(),
             bend: point.fields.iter().map(|f| f[0] / length).collect(),
             rib_slope: point.fields.iter().map(|f| f[1]).collect(),
+            curved: program
+                .model
+                .curved(&point.fields, length)
+                .map(CurvedRibs::from),
         }
     }
 
@@ -183,7 +192,8 @@ impl Problem {
         let sign = self.belt.seam_sign();
         let [bend, slope] = self.belt.goes_on_through_seam();
         let goes_on = [bend && !self.moment_acts_at_seam(), slope];
-        let factors = goes_on.map(|goes_on| goes_on.then_some(sign));
+        let [bend, slope] = goes_on.map(|goes_on| goes_on.then_some(sign));
+        let factors = [bend, slope, None, None, None, None];
         [Tie::Pose(turn), Tie::Fields(factors)].map(|tie| NodeLink {
             nodes: [0, last],
             tie,

@@ -48,6 +48,8 @@ pub(crate) struct Strip {
     pub rigidity: Rigidity,
     /// Natural bend.
     pub curl: Curl,
+    /// Stretching stiffness over bending stiffness; infinite where no thickness is known.
+    pub stretching: f64,
 }
 
 /// A place that must be a node of the mesh.
@@ -132,6 +134,7 @@ impl Strip {
     fn goes_on_to(&self, next: &Self) -> bool {
         self.geodesic == next.geodesic
             && self.curl == next.curl
+            && self.stretching == next.stretching
             && self.rigidity_at(self.length) == next.rigidity_at(0.0)
     }
 }
@@ -150,6 +153,7 @@ impl Segment {
                     bend: belt.natural_bend_of(segment),
                     poisson: belt.poisson_value(),
                 },
+                stretching: belt.stretching().unwrap_or(f64::INFINITY),
             }))
         };
         match *segment {
@@ -385,6 +389,7 @@ impl Belt {
                     bend: strip.curl.bend * length,
                     ..strip.curl
                 },
+                stretching: strip.stretching * length * length,
             })
         })
     }
@@ -409,6 +414,7 @@ mod tests {
             geodesic,
             rigidity: Rigidity::Constant(rigidity),
             curl: Curl::default(),
+            stretching: f64::INFINITY,
         })
     }
 
@@ -511,6 +517,7 @@ mod tests {
             geodesic: 0.0,
             rigidity: Rigidity::Table(table),
             curl: Curl::default(),
+            stretching: f64::INFINITY,
         })]);
         assert!((belt.mean_rigidity() - 2.0).abs() < 1e-15);
         let pieces = pieces_of(&belt, 20, &[]);

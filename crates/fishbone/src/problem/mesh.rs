@@ -4,6 +4,7 @@ use super::Problem;
 use crate::problem::belt::Division;
 use crate::problem::program::{BeltProgram, Piece};
 use crate::strip::bounds::ActiveEdges;
+use crate::strip::density::Density;
 
 /// A mesh, with the active edges of its pieces.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,10 +25,13 @@ impl Mesh {
     }
 
     /// The mesh of a programme of a problem.
-    pub(crate) fn of(problem: &Problem, program: &BeltProgram) -> Self {
+    pub(crate) fn of<D: Density<F>, const F: usize, const N: usize>(
+        problem: &Problem,
+        program: &BeltProgram<D, F, N>,
+    ) -> Self {
         let pieces = program.pieces.iter().map(is_strip);
         Self {
-            divisions: problem.division_of(program),
+            divisions: problem.division_of(&program.pieces),
             pieces: pieces.zip(program.edges.iter().copied()).collect(),
         }
     }

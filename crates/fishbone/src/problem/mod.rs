@@ -19,7 +19,7 @@ mod units;
 use crate::geometry::{Pose, log};
 use crate::problem::belt::Belt;
 use crate::scenario::error::ScenarioError;
-use crate::scenario::{Component, Method, Scenario, SupportSpec};
+use crate::scenario::{Component, EnergyModel, Method, Scenario, SupportSpec};
 use nalgebra::{Matrix3, Vector3};
 use std::sync::Arc;
 
@@ -110,6 +110,21 @@ impl Problem {
         let mut scenario = Scenario::clone(&self.scenario);
         scenario.solver.elements = Some(elements);
         self.on_the_same_belt(scenario)
+    }
+
+    /// Whether the belt is a strip of finite thickness.
+    pub(crate) fn is_of_shell(&self) -> bool {
+        self.scenario.energy == EnergyModel::Shell
+    }
+
+    /// The same problem with another energy of the same belt.
+    pub(crate) fn with_energy(&self, energy: EnergyModel) -> Self {
+        let mut scenario = Scenario::clone(&self.scenario);
+        scenario.energy = energy;
+        Self {
+            scenario: Arc::new(scenario),
+            ..self.clone()
+        }
     }
 
     /// The same problem with a support, given by its place in the scenario, held at another pose.

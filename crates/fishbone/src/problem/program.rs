@@ -23,16 +23,17 @@ pub(crate) use load::weight;
 pub use load::{DeadForce, NodeLoad};
 pub use obstacle::{NodeObstacle, Obstacle};
 pub use piece::Piece;
-pub(crate) use piece::slope_beyond;
 pub(crate) use support::Turn;
 pub use support::{Hold, NodeSupport};
 
 use crate::geometry::Pose;
 use crate::strip::bounds::{ACTIVE, ActiveEdges, RibBounds};
 use crate::strip::density::{Density, LANES, Motions};
-use crate::strip::developable::EnergyModel;
+use crate::strip::developable::DevelopableEnergy;
 use crate::strip::element::Element;
+use crate::strip::shell::{FIELDS, Shell};
 use nalgebra::{Rotation3, SVector, UnitQuaternion, Vector3, Vector6};
+use num_dual::DualNum;
 use stagewise::{Distance, NodeVector};
 
 /// Unknowns of a node of a developable belt: a twist of the pose in world axes about the origin, then bend and rib slope.
@@ -50,7 +51,7 @@ pub(crate) fn rows_of(multipliers: &[f64], place: usize) -> Rows {
 
 /// The programme of a belt. Lengths are in U and energies in mean R_f/U.
 #[derive(Debug, Clone, PartialEq)]
-pub struct BeltProgram<D = EnergyModel, const F: usize = 2, const N: usize = 8> {
+pub struct BeltProgram<D = DevelopableEnergy, const F: usize = 2, const N: usize = 8> {
     /// Pieces in order along the spine.
     pub pieces: Vec<Piece>,
     /// Active edges of every piece; only strips have any.
@@ -121,11 +122,31 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         self.fixed = (0..nodes).map(|node| self.fixed_by_pieces(node)).collect();
         self.fix_across_seam();
         for support in supports.iter().filter(|support| support.square_rib) {
-            self.fixed[support.node][1].get_or_insert(0.0);
+            self.hold_square(support.node);
         }
         self.supports = supports;
         self.fix_across_joints();
         self
+    }
+
+    /// The same belt with another density of the energy.
+    pub(crate) fn as_shell(&self, shell: Shell) -> BeltProgram<Shell, FIELDS, 12> {
+        let mut program = BeltProgram::new(self.pieces.clone(), shell);
+        program.half_turns = self.half_turns;
+        let mut program = program.with_supports(self.supports.clone());
+        program.links = self.links.clone();
+        for link in &mut program.links {
+            if let Tie::Fields(factors) = &mut link.tie {
+                let [bend, slope, ..] = *factors;
+                // The twist does not change its sign where bend and slope do.
+                let twist = slope.map(|sign| sign * sign);
+                *factors = [bend, slope, slope, twist, slope, slope];
+            }
+        }
+        program.loads = self.loads.clone();
+        program.weight = self.weight;
+        program.obstacles = self.obstacles.clone();
+        program
     }
 
     /// A closed belt cut open at its seam and twisted there by an angle in place of its half turns, as between two
@@ -138,7 +159,7 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
                 Tie::Pose(turn) => {
                     *turn = UnitQuaternion::from_scaled_axis(angle * Vector3::y());
                 }
-                Tie::Fields(fields) => *fields = [None; 2],
+                Tie::Fields(fields) => *fields = [None; ROWS],
             }
         }
         cut
@@ -212,50 +233,106 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         }
     }
 
+    /// Prescribes a square rib at a node.
+    fn hold_square(&mut self, node: usize) {
+        for (fixed, held) in self.fixed[node].iter_mut().zip(self.model.held()) {
+            if held {
+                fixed.get_or_insert(0.0);
+            }
+        }
+    }
+
     /// Prescribes a square rib on both sides of the seam of a closed belt if a stiffener is beside it.
     fn fix_across_seam(&mut self) {
         let is_rigid = |piece: Option<&Piece>| matches!(piece, Some(Piece::Rigid { .. }));
         let beside = is_rigid(self.pieces.first()) || is_rigid(self.pieces.last());
         if self.half_turns.is_some() && beside {
             for node in [0, self.pieces.len()] {
-                self.fixed[node][1] = Some(0.0);
+                self.hold_square(node);
             }
         }
     }
 
     /// Prescribes the rib on the other side of a joint wherever it is prescribed on one side.
     fn fix_across_joints(&mut self) {
-        for (k, piece) in self.pieces.iter().enumerate() {
-            let Piece::Joint { angle } = *piece else {
+        for k in 0..self.pieces.len() {
+            let Some((angle, [before, after])) = self.joint(k) else {
                 continue;
             };
-            let across = |slope: Option<f64>, angle| Some(slope_beyond(slope?, angle)?[0]);
-            let [before, after] = [self.fixed[k][1], self.fixed[k + 1][1]];
-            self.fixed[k][1] = before.or(across(after, -angle));
-            self.fixed[k + 1][1] = after.or(across(before, angle));
+            let ways = [
+                (k, k + 1, angle, [before, after]),
+                (k + 1, k, -angle, [after, before]),
+            ];
+            for (from, to, angle, geodesic) in ways {
+                let fixed = self.fixed[from];
+                let known = fixed.map(|fixed| fixed.unwrap_or(0.0));
+                let rib = fixed[1].and_then(|_| self.model.beyond(angle, geodesic, &known));
+                for i in 0..F {
+                    if self.model.held()[i]
+                        && fixed[i].is_some()
+                        && let Some(rib) = &rib
+                    {
+                        self.fixed[to][i].get_or_insert(rib[i]);
+                    }
+                }
+            }
+        }
+    }
+
+    /// The angle of the joint that a piece is, and the in-plane curvature of the board before and beyond.
+    fn joint(&self, piece: usize) -> Option<(f64, [f64; 2])> {
+        let geodesic = |k: Option<usize>| match k.and_then(|k| self.pieces.get(k)) {
+            Some(Piece::Strip(element)) => element.geodesic,
+            _ => 0.0,
+        };
+        match self.pieces[piece] {
+            Piece::Joint { angle } => {
+                Some((angle, [piece.checked_sub(1), Some(piece + 1)].map(geodesic)))
+            }
+            Piece::Strip(_) | Piece::Rigid { .. } => None,
         }
     }
 
     /// Whether each field of a node is an unknown: neither prescribed nor carried on from the node before.
     fn free(&self, node: usize) -> [bool; F] {
-        let mut free = self.fixed[node].map(|fixed| fixed.is_none());
-        free[1] &= !self.is_tied(node);
-        free
+        let tied = self.tied(node);
+        std::array::from_fn(|i| self.fixed[node][i].is_none() && !tied[i])
     }
 
-    /// Whether the slope of a node is carried on from the node before.
-    fn is_tied(&self, node: usize) -> bool {
+    /// Whether each field of a node is carried on from the node before.
+    fn tied(&self, node: usize) -> [bool; F] {
         let joint = node
             .checked_sub(1)
             .is_some_and(|k| matches!(self.pieces[k], Piece::Joint { .. }));
-        joint && self.fixed[node][1].is_none()
+        let is_free = joint && self.fixed[node][1].is_none();
+        self.model.carried().map(|carried| is_free && carried)
     }
 
-    /// The slope carried on to a node across a joint, with derivatives.
-    fn carried_slope(&self, point: &BeltPoint<F>, node: usize) -> Option<[f64; 3]> {
-        match self.pieces[node - 1] {
-            Piece::Joint { angle } => slope_beyond(point.fields[node - 1][1], angle),
-            Piece::Strip(_) | Piece::Rigid { .. } => None,
+    /// Whether the rib of a node is carried on from the node before.
+    fn is_tied(&self, node: usize) -> bool {
+        self.tied(node)[1]
+    }
+
+    /// The fields beyond the joint before a node, of which some are carried on.
+    fn beyond<T: DualNum<Primitive = f64> + Copy>(
+        &self,
+        node: usize,
+        fields: &[T; F],
+    ) -> Option<[T; F]> {
+        let (angle, geodesic) = self.joint(node - 1)?;
+        self.model.beyond(angle, geodesic, fields)
+    }
+
+    /// Carries fields on across the joint before a node; they stay where the rib would leave through a bend of the board.
+    fn carry_across(&self, point: &mut BeltPoint<F>, node: usize) {
+        if self.is_tied(node)
+            && let Some(beyond) = self.beyond(node, &point.fields[node - 1].data.0[0])
+        {
+            for (i, tied) in self.tied(node).into_iter().enumerate() {
+                if tied {
+                    point.fields[node][i] = beyond[i];
+                }
+            }
         }
     }
 
@@ -269,11 +346,7 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
                     point.fields[node][i] = *fixed;
                 }
             }
-            if self.is_tied(node)
-                && let Some([slope, ..]) = self.carried_slope(point, node)
-            {
-                point.fields[node][1] = slope;
-            }
+            self.carry_across(point, node);
         }
         self.carry(point);
     }
@@ -283,12 +356,13 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         if self.rib_leaves_through_bend(point) {
             return f64::NEG_INFINITY;
         }
-        self.elements()
-            .flat_map(|(k, element)| {
-                let bounds = self.bounds(k, element);
-                bounds.slacks(slopes_of(&point.fields, k))
-            })
-            .fold(f64::INFINITY, f64::min)
+        let mut slacks = Vec::new();
+        for (k, element) in self.elements() {
+            let ends = [&point.fields[k], &point.fields[k + 1]];
+            self.model
+                .slacks(element, &self.edges[k], ends, &mut slacks);
+        }
+        slacks.into_iter().fold(f64::INFINITY, f64::min)
     }
 
     /// Greatest residual of a shape's supports, lengths in U and angles in rad.
@@ -298,7 +372,8 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
     }
 
     fn rib_leaves_through_bend(&self, point: &BeltPoint<F>) -> bool {
-        let leaves = |node| self.is_tied(node) && self.carried_slope(point, node).is_none();
+        let fields = |node: usize| point.fields[node - 1].data.0[0];
+        let leaves = |node| self.is_tied(node) && self.beyond(node, &fields(node)).is_none();
         (1..point.fields.len()).any(leaves)
     }
 
@@ -320,10 +395,7 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
 
     /// The inequalities that keep the ribs of an element apart; `k` is the element's number among the pieces.
     pub(crate) fn bounds(&self, k: usize, element: &Element) -> RibBounds<'_> {
-        RibBounds {
-            strips: element.strips(),
-            edges: &self.edges[k],
-        }
+        element.bounds(&self.edges[k])
     }
 
     /// Arc length of every node, in U.
@@ -340,10 +412,9 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
 
     /// Bending energy of a shape.
     pub(crate) fn elastic_energy(&self, fields: &[SVector<f64, F>]) -> f64 {
-        let energy = |(k, element): (usize, &Element)| {
-            self.model.energy(element, [&fields[k], &fields[k + 1]])
-        };
-        self.elements().map(energy).sum()
+        let elements = self.elements();
+        let with_fields = elements.map(|(k, element)| (element, [&fields[k], &fields[k + 1]]));
+        self.model.total_energy(with_fields)
     }
 
     /// Potential of weight, loads and moments.
@@ -518,11 +589,6 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
             .map(|place| -rows_of(multipliers, place).fixed_rows::<3>(0).into_owned())
             .collect()
     }
-}
-
-/// The rib slopes at both ends of a piece.
-fn slopes_of<const F: usize>(fields: &[SVector<f64, F>], piece: usize) -> [f64; 2] {
-    [fields[piece][1], fields[piece + 1][1]]
 }
 
 /// Adds a wrench about the origin to the derivative by a node's state.

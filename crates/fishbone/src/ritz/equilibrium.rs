@@ -22,7 +22,7 @@ pub(crate) fn solve(
         width_over_length: problem.belt().width / length,
         end_position: to_end.position / length,
         end_orientation: Orientation::as_in_source(&to_end.frame),
-        energy: scenario.energy,
+        energy: scenario.energy.developable(),
         bulge: side(start, &to_end, &problem.bulge()),
     };
     let options = Options::from(&scenario.solver.ritz);
@@ -73,6 +73,7 @@ fn report(problem: &Problem, start: &Pose, solution: &Solution) -> Equilibrium {
             pose: u.iter().zip(solution.positions(&u)).map(pose).collect(),
             bend: rate(2).collect(),
             rib_slope: u.iter().map(|u| solution.rib_slope(*u)).collect(),
+            curved: None,
             u: u.iter().map(|u| u * units.length).collect(),
         },
         internal: Vec::new(),

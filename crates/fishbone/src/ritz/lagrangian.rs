@@ -319,7 +319,7 @@ fn consecutive(first: usize) -> [usize; QUANTITIES] {
 #[cfg(test)]
 mod tests {
     use super::super::tests::examples;
-    use super::super::{EnergyModel, Orientation, Side};
+    use super::super::{DevelopableEnergy, Orientation, Side};
     use super::*;
     use approx::assert_relative_eq;
     use num_dual::{Dual2_64, second_derivative};
@@ -440,12 +440,20 @@ mod tests {
             let stretch: f64 = 1.0 + slope * slope;
             let plate = 0.5 * (bend * stretch).powi(2);
             assert_relative_eq!(
-                energy(EnergyModel::Fishbone),
+                energy(DevelopableEnergy::Fishbone),
                 plate * stretch.sqrt(),
                 max_relative = 1e-13
             );
-            assert_relative_eq!(energy(EnergyModel::Sadowsky), plate, max_relative = 1e-13);
-            assert_relative_eq!(energy(EnergyModel::Wunderlich), plate, max_relative = 1e-13);
+            assert_relative_eq!(
+                energy(DevelopableEnergy::Sadowsky),
+                plate,
+                max_relative = 1e-13
+            );
+            assert_relative_eq!(
+                energy(DevelopableEnergy::Wunderlich),
+                plate,
+                max_relative = 1e-13
+            );
         }
     }
 

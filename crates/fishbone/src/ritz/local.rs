@@ -2,7 +2,7 @@
 
 use super::Orientation;
 use super::basis::LOCALS;
-use crate::strip::developable::EnergyModel;
+use crate::strip::developable::DevelopableEnergy;
 use crate::strip::element::Curl;
 use crate::strip::ribs::Across;
 use nalgebra::{Matrix3, SVector};
@@ -52,7 +52,7 @@ pub(super) fn euler<D: Scalar>(q: &Local<D>) -> [D; 3] {
 ///
 /// Units: R_f/U².
 /// Source: Eq. (29), (34)
-pub(super) fn density<D: Scalar>(energy: EnergyModel, width: f64, q: &Local<D>) -> D {
+pub(super) fn density<D: Scalar>(energy: DevelopableEnergy, width: f64, q: &Local<D>) -> D {
     let across = Across::straight(q[7] * (0.5 * width));
     energy.value(rates(q)[2], q[6], &Curl::<f64>::default(), &across)
 }

@@ -19,7 +19,7 @@ mod local;
 mod newton;
 
 use crate::scenario::RitzSpec;
-use crate::strip::developable::EnergyModel;
+use crate::strip::developable::DevelopableEnergy;
 use basis::{FIELDS, localiser, quadrature};
 use lagrangian::Lagrangian;
 use local::Local;
@@ -82,7 +82,7 @@ pub struct Problem {
     /// Orientation of the end.
     pub end_orientation: Orientation,
     /// Energy model.
-    pub energy: EnergyModel,
+    pub energy: DevelopableEnergy,
     /// Side to which the belt bulges.
     pub bulge: Side,
 }
@@ -486,7 +486,7 @@ mod tests {
             width_over_length: 0.1,
             end_position: position,
             end_orientation: Orientation::as_in_source(&frame),
-            energy: EnergyModel::Fishbone,
+            energy: DevelopableEnergy::Fishbone,
             bulge: Side::Plus,
         };
         [
@@ -591,9 +591,9 @@ mod tests {
             assert!(solution.stationary);
             solution.energy
         };
-        let sadowsky = minimum(EnergyModel::Sadowsky);
-        assert!(sadowsky < minimum(EnergyModel::Fishbone));
-        assert!(sadowsky < minimum(EnergyModel::Wunderlich));
+        let sadowsky = minimum(DevelopableEnergy::Sadowsky);
+        assert!(sadowsky < minimum(DevelopableEnergy::Fishbone));
+        assert!(sadowsky < minimum(DevelopableEnergy::Wunderlich));
     }
 
     #[test]

@@ -9,10 +9,11 @@ mod validate;
 
 use crate::board::material::{Laminate, Layer, Material};
 use crate::geometry::{Euler, exp, frame_from_euler};
-pub use crate::strip::developable::EnergyModel;
+use crate::strip::developable::DevelopableEnergy;
 pub use schema::{
-    Axis, BeltSpec, Component, LayerSpec, LinkSpec, LoadsSpec, MaterialSpec, Method, Place,
-    PointLoad, Rigidity, RigidityTable, RitzSpec, Scenario, SegmentSpec, SolverSpec, SupportSpec,
+    Axis, BeltSpec, Component, EnergyModel, LayerSpec, LinkSpec, LoadsSpec, MaterialSpec, Method,
+    Place, PointLoad, Rigidity, RigidityTable, RitzSpec, Scenario, SegmentSpec, SolverSpec,
+    SupportSpec,
 };
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
@@ -85,6 +86,17 @@ fn default_elements(length: f64, width: f64) -> usize {
     ((exact - 1e-9 * exact).ceil() as usize).clamp(80, 100_000)
 }
 
+impl EnergyModel {
+    /// The density of a developable belt; of a shell, the density of the limit of no thickness.
+    pub(crate) fn developable(self) -> DevelopableEnergy {
+        match self {
+            Self::Fishbone => DevelopableEnergy::Fishbone,
+            Self::Sadowsky => DevelopableEnergy::Sadowsky,
+            Self::Wunderlich | Self::Shell => DevelopableEnergy::Wunderlich,
+        }
+    }
+}
+
 impl BeltSpec {
     /// A belt of this width and rigidity, open and flat where nothing acts on it. Units: m, N·m².
     pub fn new(width: f64, rigidity: f64, segments: Vec<SegmentSpec>) -> Self {
@@ -93,6 +105,7 @@ impl BeltSpec {
             rigidity: Some(rigidity),
             material: None,
             layers: None,
+            thickness: None,
             poisson: None,
             natural_bend: 0.0,
             density: 0.0,
@@ -147,8 +160,19 @@ impl BeltSpec {
         own.map_or(self.density, |mass| mass * self.width)
     }
 
-    /// Thickness of the sheet or of all layers; `None` where the belt is given by its rigidity.
-    pub(crate) fn thickness(&self) -> Option<f64> {
+    /// Stretching stiffness over bending stiffness, E h/D; `None` where no thickness is known. Units: 1/m².
+    pub(crate) fn stretching(&self) -> Option<f64> {
+        let of_layers = || {
+            self.laminate()
+                .map(|laminate| laminate.stretching / laminate.rigidity)
+        };
+        let poisson = self.poisson_value();
+        let of_sheet = |thickness: f64| 12.0 * (1.0 - poisson * poisson) / (thickness * thickness);
+        of_layers().or_else(|| self.thickness.map(of_sheet))
+    }
+
+    /// Thickness of the sheet or of all layers, or as given; `None` where the belt is given by its rigidity alone.
+    pub(crate) fn thickness_value(&self) -> Option<f64> {
         let sheet = self.material.as_ref().map(|sheet| sheet.thickness);
         let layers = || {
             Some(
@@ -159,7 +183,7 @@ impl BeltSpec {
                     .sum(),
             )
         };
-        sheet.or_else(layers)
+        sheet.or_else(layers).or(self.thickness)
     }
 
     /// Whether the belt's material is given in SI units: by name, or by a Young's modulus that is too large to be in MPa.

@@ -2,7 +2,6 @@
 
 use super::table::table;
 use crate::names::named;
-use crate::strip::developable::EnergyModel;
 
 table! {
     /// A belt, its supports and loads, and how to solve for its shape.
@@ -13,7 +12,7 @@ table! {
         /// Name for people, as in titles of figures.
         #[serde(default)]
         pub name: String,
-        /// Energy model of the bent belt.
+        /// Energy of the bent belt.
         #[serde(default)]
         pub energy: EnergyModel,
         /// The belt itself, in its flat, unloaded state.
@@ -54,7 +53,12 @@ table! {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(length(min = 1, max = 1000))]
         pub layers: Option<Vec<LayerSpec>>,
-        /// Poisson's ratio ν, used only where `natural_bend` is not 0; that of a material or layers wins. Default: 0.3.
+        /// Thickness of a belt given by its rigidity, for `energy = "shell"`; a material and layers have their own. Units: m.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        pub thickness: Option<f64>,
+        /// Poisson's ratio ν, used only where `natural_bend` is not 0 and for `energy = "shell"`; that of a material or layers
+        /// wins. Default: 0.3.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(extend("exclusiveMinimum" = -1, "exclusiveMaximum" = 0.5))]
         pub poisson: Option<f64>,
@@ -293,6 +297,22 @@ table! {
         /// From the spine point to where the force acts, body axes. Shapes: (3,). Units: m.
         #[serde(default)]
         pub lever: [f64; 3],
+    }
+}
+
+named! {
+    /// The energy of the bent belt.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+    pub enum EnergyModel {
+        /// Developable belt, the source's: R_f/2 · sqrt(1+β²) · κ₁², Eq. (34).
+        Fishbone = "fishbone",
+        /// Developable belt, the narrow limit of the plate: R_f/2 · κ₁².
+        Sadowsky = "sadowsky",
+        /// Developable plate of finite width.
+        #[default]
+        Wunderlich = "wunderlich",
+        /// Plate of finite width and thickness, which may stretch.
+        Shell = "shell",
     }
 }
 

@@ -1,6 +1,6 @@
 //! Motions and derivatives of elements by automatic differentiation, for any density.
 
-use super::density::{self, Density, LANES, Loaded, between, element_energy};
+use super::density::{self, Density, LANES, Loaded, element_energy};
 use super::element::Element;
 use crate::geometry::{Pose, SHORTENING, gauss_points};
 use nalgebra::{Matrix3, SVector, Vector3, Vector6};
@@ -211,7 +211,8 @@ where
     let h = element.length;
     let weight = 3f64.sqrt() / 12.0 * h * h;
     let [a, b] = gauss_points().map(|t| {
-        let [torsion, bend] = density.torsion_and_bend(&between(ends, t));
+        let fields = density.section(element, *ends, t).fields;
+        let [torsion, bend] = density.torsion_and_bend(&fields);
         [T::from(element.geodesic), torsion, bend]
     });
     let commutator = cross(a, b);

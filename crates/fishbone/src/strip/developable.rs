@@ -9,7 +9,7 @@ use num_dual::DualNum;
 named! {
     /// Bending energy per unit length of the spine.
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-    pub enum EnergyModel {
+    pub enum DevelopableEnergy {
         /// The source's: R_f/2 · sqrt(1+β²) · κ₁², Eq. (34).
         Fishbone = "fishbone",
         /// Narrow limit of the developable plate: R_f/2 · κ₁².
@@ -31,7 +31,7 @@ pub(crate) struct Term {
     pub hessian: Matrix2<f64>,
 }
 
-impl EnergyModel {
+impl DevelopableEnergy {
     /// The density that a search solves with where this one leads to no minimum: `wunderlich`, which keeps the ribs apart of
     /// itself, and for `wunderlich` the density that lets them come close.
     pub(crate) fn stand_in(self) -> Self {
@@ -156,10 +156,10 @@ mod tests {
     use num_dual::{Dual2SVec64, hessian};
 
     /// Energy models, one of each.
-    const MODELS: [EnergyModel; 3] = [
-        EnergyModel::Fishbone,
-        EnergyModel::Sadowsky,
-        EnergyModel::Wunderlich,
+    const MODELS: [DevelopableEnergy; 3] = [
+        DevelopableEnergy::Fishbone,
+        DevelopableEnergy::Sadowsky,
+        DevelopableEnergy::Wunderlich,
     ];
 
     #[test]
@@ -205,7 +205,7 @@ mod tests {
         }
     }
 
-    fn density(model: EnergyModel, bend: f64, slope: f64, curl: &Curl) -> f64 {
+    fn density(model: DevelopableEnergy, bend: f64, slope: f64, curl: &Curl) -> f64 {
         model.value(bend, slope, curl, &Across::PLAIN)
     }
 
@@ -215,9 +215,9 @@ mod tests {
         let (bend, slope) = (angle.cos().powi(2) / radius, angle.tan());
         let plate = 0.5 / radius.powi(2);
         let at = |model| density(model, bend, slope, &Curl::default());
-        assert!((at(EnergyModel::Sadowsky) - plate).abs() < 1e-13);
-        assert!((at(EnergyModel::Wunderlich) - plate).abs() < 1e-13);
-        assert!((at(EnergyModel::Fishbone) - plate / angle.cos()).abs() < 1e-13);
+        assert!((at(DevelopableEnergy::Sadowsky) - plate).abs() < 1e-13);
+        assert!((at(DevelopableEnergy::Wunderlich) - plate).abs() < 1e-13);
+        assert!((at(DevelopableEnergy::Fishbone) - plate / angle.cos()).abs() < 1e-13);
     }
 
     #[test]
@@ -235,7 +235,7 @@ mod tests {
             bend: k,
             poisson: nu,
         };
-        assert!((density(EnergyModel::Sadowsky, bend, slope, &curl) - plate).abs() < 1e-12);
+        assert!((density(DevelopableEnergy::Sadowsky, bend, slope, &curl) - plate).abs() < 1e-12);
     }
 
     #[test]

@@ -4,6 +4,7 @@
 //! taken at the same two Gauss points: at different ones, a node-to-node zigzag of the unknowns would cost one of them nothing.
 
 use crate::geometry::{Pose, SHORTENING, Twist, gauss_points, magnus};
+use crate::strip::bounds::{ActiveEdges, RibBounds};
 use crate::strip::ribs::Strips;
 use nalgebra::{Vector3, Vector4};
 
@@ -30,6 +31,23 @@ pub(crate) fn increment(length: f64, geodesic: f64, fields: &Vector4<f64>) -> Po
     Pose::exp(&gauss.step(length, geodesic))
 }
 
+/// The motion along a piece of the spine, by a fourth-order Magnus step from bend and torsion at its two Gauss points.
+pub(crate) fn increment_of(length: f64, geodesic: f64, rates: [[f64; 2]; 2]) -> Pose {
+    let [first, second] = rates.map(|[bend, torsion]| Twist {
+        translation: Vector3::y(),
+        rotation: Vector3::new(geodesic, torsion, bend),
+    });
+    Pose::exp(&step(&first, &second, length))
+}
+
+/// The Magnus step by twists per unit length at the two Gauss points, no longer than its arc.
+fn step(first: &Twist, second: &Twist, length: f64) -> Twist {
+    let rise = second.rotation.z - first.rotation.z;
+    let mut step = magnus(first, second, length);
+    step.translation.y -= SHORTENING * rise * rise * length.powi(3);
+    step
+}
+
 /// The natural bend of a belt, with its Poisson's ratio.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Curl<W = f64> {
@@ -52,6 +70,9 @@ pub struct Element {
     pub half_width: f64,
     /// Natural bend of the element.
     pub curl: Curl,
+    /// Stretching stiffness E h over the plate's rigidity D, in 1/U²: 12(1−ν²)/h² of a sheet of the thickness h. Infinite of
+    /// a belt that does not stretch.
+    pub stretching: f64,
 }
 
 /// Bend and slope at the two Gauss points.
@@ -75,13 +96,10 @@ impl GaussFields {
         [0, 1].map(|i| strain(geodesic, self.bend[i], self.slope[i]))
     }
 
-    /// The Magnus step, no longer than its arc.
+    /// The Magnus step.
     fn step(&self, length: f64, geodesic: f64) -> Twist {
         let [first, second] = self.strains(geodesic);
-        let rise = second.rotation.z - first.rotation.z;
-        let mut step = magnus(&first, &second, length);
-        step.translation.y -= SHORTENING * rise * rise * length.powi(3);
-        step
+        step(&first, &second, length)
     }
 }
 
@@ -94,6 +112,22 @@ impl Element {
             rigidity: [1.0; 2],
             half_width,
             curl,
+            stretching: f64::INFINITY,
+        }
+    }
+
+    /// Rigidity at parameter t of the element, of which it is a linear function.
+    pub(crate) fn rigidity_at(&self, t: f64) -> f64 {
+        let [a, b] = gauss_points();
+        let [first, second] = self.rigidity;
+        first + (second - first) * ((t - a) / (b - a))
+    }
+
+    /// The inequalities that keep its ribs apart.
+    pub(crate) fn bounds<'a>(&self, edges: &'a ActiveEdges) -> RibBounds<'a> {
+        RibBounds {
+            strips: self.strips(),
+            edges,
         }
     }
 

@@ -1,7 +1,7 @@
 //! The energy of one element of a developable belt, with derivatives.
 
 use crate::geometry::gauss_points;
-use crate::strip::developable::{EnergyModel, Term};
+use crate::strip::developable::{DevelopableEnergy, Term};
 use crate::strip::element::{Element, GaussFields};
 use crate::strip::ribs::{Across, SlopeJet};
 use nalgebra::{Matrix2, Matrix2x4, Matrix4, Vector4};
@@ -72,7 +72,7 @@ impl From<SlopeJet> for Jet {
 
 impl Element {
     /// Energy, without derivatives.
-    pub(crate) fn energy(&self, model: EnergyModel, fields: &Vector4<f64>) -> f64 {
+    pub(crate) fn energy(&self, model: DevelopableEnergy, fields: &Vector4<f64>) -> f64 {
         let gauss = GaussFields::at(fields);
         let across = if model.knows_width() {
             self.strips().across([fields[1], fields[3]])
@@ -89,7 +89,7 @@ impl Element {
     /// Factors of the width in the terms of the energy, with derivatives.
     pub(crate) fn across_jets(
         &self,
-        model: EnergyModel,
+        model: DevelopableEnergy,
         fields: &Vector4<f64>,
     ) -> Across<SlopeJet> {
         match model.knows_width() {
@@ -101,7 +101,7 @@ impl Element {
     /// The part of the energy that the natural bend adds, with its derivatives.
     pub(crate) fn curl_jet(
         &self,
-        model: EnergyModel,
+        model: DevelopableEnergy,
         fields: &Vector4<f64>,
         across: &Across<SlopeJet>,
     ) -> Jet {

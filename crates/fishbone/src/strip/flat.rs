@@ -11,7 +11,7 @@
 
 use super::automatic;
 use super::density::{Density, Section};
-use super::developable::EnergyModel;
+use super::developable::DevelopableEnergy;
 use num_dual::DualNum;
 
 /// Bend up to which a node is flat, in 1/U.
@@ -25,7 +25,7 @@ pub(crate) const FLAT: f64 = 1e-8;
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct FreeTorsion {
     /// The density of a developable belt.
-    pub(crate) model: EnergyModel,
+    pub(crate) model: DevelopableEnergy,
 }
 
 impl Density<3> for FreeTorsion {
@@ -58,7 +58,7 @@ impl Density<3> for FreeTorsion {
     }
 }
 
-impl EnergyModel {
+impl DevelopableEnergy {
     /// Bending and torsional stiffness, at unit rigidity, of the square that bounds the energy from below and touches it
     /// where ribs have a slope. The bending stiffness is not negative up to [`Self::steepest`].
     fn stiffnesses<T: DualNum<Primitive = f64> + Copy>(self, slope: T) -> [T; 2] {
@@ -84,14 +84,14 @@ mod tests {
     use crate::strip::element::{Curl, Element};
     use proptest::prelude::*;
 
-    const MODELS: [EnergyModel; 3] = [
-        EnergyModel::Fishbone,
-        EnergyModel::Sadowsky,
-        EnergyModel::Wunderlich,
+    const MODELS: [DevelopableEnergy; 3] = [
+        DevelopableEnergy::Fishbone,
+        DevelopableEnergy::Sadowsky,
+        DevelopableEnergy::Wunderlich,
     ];
 
     /// Energy of an element of uniform bend and rib slopes at its ends.
-    fn energy(model: EnergyModel, geodesic: f64, bend: f64, slopes: [f64; 2]) -> f64 {
+    fn energy(model: DevelopableEnergy, geodesic: f64, bend: f64, slopes: [f64; 2]) -> f64 {
         let element = Element {
             geodesic,
             ..Element::straight(0.1, 0.05, Curl::default())

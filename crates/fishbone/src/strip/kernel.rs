@@ -5,37 +5,37 @@
 //! with half their bracket. The loads and supports beyond an element make one wrench about the origin, the same for all
 //! elements between two points where loads or supports act.
 
-mod arithmetic;
-mod lane;
+pub(in crate::strip) mod arithmetic;
+pub(in crate::strip) mod lane;
 #[cfg(test)]
 mod tests;
 
 use crate::geometry::{Coefficients, Pose};
 use crate::strip::density::{self, LANES, Loaded};
-use crate::strip::developable::EnergyModel;
+use crate::strip::developable::DevelopableEnergy;
 use crate::strip::element::Element;
 use crate::strip::energy::Jet;
 use crate::strip::ribs::Across;
 use arithmetic::{cross, dot, triple};
-use lane::{Magnus, differentiate_lane};
+use lane::{Magnus, Step, differentiate_lane};
 use multiversion::multiversion;
-use nalgebra::{Matrix3, SMatrix, SVector, Vector2, Vector3, Vector4};
+use nalgebra::{Matrix3, SMatrix, SVector, Vector2, Vector3, Vector4, Vector6};
 use num_dual::DualNum;
 use stagewise::{Stage, StageMatrix};
 
 /// One number for every element of a block.
-type Lanes = [f64; LANES];
-type Triple = [f64; 3];
+pub(in crate::strip) type Lanes = [f64; LANES];
+pub(in crate::strip) type Triple = [f64; 3];
 /// The upper triangle of a symmetric 4×4 matrix by rows.
-type Upper = [f64; 10];
+pub(in crate::strip) type Upper = [f64; 10];
 
 /// The data that the motions along a block of elements depend on.
 #[derive(Debug, Clone)]
-struct Spans {
-    /// bend₀, slope₀, bend₁, slope₁.
-    fields: [Lanes; 4],
-    length: Lanes,
-    geodesic: Lanes,
+pub(in crate::strip) struct Spans {
+    /// The four numbers that a [`Step`] takes: bend₀, slope₀, bend₁, slope₁ of a developable element.
+    pub(in crate::strip) fields: [Lanes; 4],
+    pub(in crate::strip) length: Lanes,
+    pub(in crate::strip) geodesic: Lanes,
 }
 
 /// The data that the derivatives of a block of elements depend on.
@@ -45,6 +45,12 @@ struct Input {
     rigidity: [Lanes; 2],
     /// Factor of the width in the energy: value, gradient and Hessian (upper triangle) by slope₀ and slope₁.
     across: [Lanes; 6],
+    surroundings: Surroundings,
+}
+
+/// The poses of both nodes of every element of a block, and what pulls at its second node.
+#[derive(Debug, Clone)]
+pub(in crate::strip) struct Surroundings {
     /// Frame of the first node, column by column.
     frame: [Lanes; 9],
     /// Position of the first node.
@@ -78,17 +84,17 @@ pub struct Block {
 }
 
 /// Zero in every lane, in the unit of its field.
-const NOTHING: Lanes = [0.0; LANES];
+pub(in crate::strip) const NOTHING: Lanes = [0.0; LANES];
 
 impl Spans {
     /// Spans of no length, lengths in the solver's U: they fill the lanes of a block that is not full.
-    const NONE: Self = Self {
+    pub(in crate::strip) const NONE: Self = Self {
         fields: [NOTHING; 4],
         length: NOTHING,
         geodesic: NOTHING,
     };
 
-    fn set(&mut self, lane: usize, element: &Element, fields: &Vector4<f64>) {
+    pub(in crate::strip) fn set(&mut self, lane: usize, element: &Element, fields: &Vector4<f64>) {
         for (lanes, field) in self.fields.iter_mut().zip(fields) {
             lanes[lane] = *field;
         }
@@ -96,10 +102,39 @@ impl Spans {
     }
 }
 
+impl Surroundings {
+    /// Frames and wrenches of zeros.
+    pub(in crate::strip) const NONE: Self = Self {
+        frame: [NOTHING; 9],
+        position: [NOTHING; 3],
+        next: [NOTHING; 3],
+        wrench: [NOTHING; 6],
+    };
+
+    pub(in crate::strip) fn set(
+        &mut self,
+        lane: usize,
+        [first, second]: [&Pose; 2],
+        wrench: &Vector6<f64>,
+    ) {
+        put(&mut self.frame, lane, first.frame.as_slice());
+        put(&mut self.position, lane, first.position.as_slice());
+        put(&mut self.next, lane, second.position.as_slice());
+        put(&mut self.wrench, lane, wrench.as_slice());
+    }
+}
+
+/// Puts numbers into a lane.
+fn put(lanes: &mut [Lanes], lane: usize, values: &[f64]) {
+    for (lanes, value) in lanes.iter_mut().zip(values) {
+        lanes[lane] = *value;
+    }
+}
+
 /// The motions along a block of elements.
 #[derive(Debug, Clone)]
 pub struct Motions {
-    spans: Spans,
+    pub(in crate::strip) spans: Spans,
     /// Frames, column by column.
     frame: [Lanes; 9],
     position: [Lanes; 3],
@@ -116,7 +151,23 @@ impl Default for Motions {
     }
 }
 
-impl density::Density<2> for EnergyModel {
+impl Motions {
+    /// Finds the motions by steps that take the four fields of the spans.
+    pub(in crate::strip) fn find_by<S: Step>(&mut self) {
+        find_motions::<S>(&self.spans, &mut self.frame, &mut self.position);
+    }
+
+    /// The motion of a lane.
+    pub(in crate::strip) fn found(&self, lane: usize) -> Pose {
+        let [x, y, z] = triple(&self.position, 0, lane);
+        Pose {
+            frame: Matrix3::from_iterator(self.frame.iter().map(|entry| entry[lane])),
+            position: Vector3::new(x, y, z),
+        }
+    }
+}
+
+impl density::Density<2> for DevelopableEnergy {
     type Motions = Motions;
     type Derivatives = Block;
 
@@ -127,7 +178,7 @@ impl density::Density<2> for EnergyModel {
             true => section.element.strips().across(slopes),
             false => Across::PLAIN.map(T::from),
         };
-        EnergyModel::value(*self, bend, slope, section.curl(), &across)
+        DevelopableEnergy::value(*self, bend, slope, section.curl(), &across)
     }
 
     fn energy(&self, element: &Element, [a, b]: [&Vector2<f64>; 2]) -> f64 {
@@ -135,22 +186,18 @@ impl density::Density<2> for EnergyModel {
     }
 }
 
-impl density::Motions<EnergyModel, 2> for Motions {
+impl density::Motions<DevelopableEnergy, 2> for Motions {
     fn set(&mut self, lane: usize, element: &Element, [a, b]: [&Vector2<f64>; 2]) {
         let fields = Vector4::new(a[0], a[1], b[0], b[1]);
         self.spans.set(lane, element, &fields);
     }
 
-    fn find(&mut self, _: &EnergyModel) {
-        find_motions(&self.spans, &mut self.frame, &mut self.position);
+    fn find(&mut self, _: &DevelopableEnergy) {
+        self.find_by::<Magnus>();
     }
 
     fn at(&self, lane: usize) -> Pose {
-        let [x, y, z] = triple(&self.position, 0, lane);
-        Pose {
-            frame: Matrix3::from_iterator(self.frame.iter().map(|entry| entry[lane])),
-            position: Vector3::new(x, y, z),
-        }
+        self.found(lane)
     }
 }
 
@@ -162,10 +209,7 @@ impl Default for Block {
                 spans: Spans::NONE,
                 rigidity: [NOTHING; 2],
                 across: [NOTHING; 6],
-                frame: [NOTHING; 9],
-                position: [NOTHING; 3],
-                next: [NOTHING; 3],
-                wrench: [NOTHING; 6],
+                surroundings: Surroundings::NONE,
             },
             output: Output {
                 growth: [[NOTHING; 6]; 4],
@@ -178,12 +222,12 @@ impl Default for Block {
     }
 }
 
-impl density::Derivatives<EnergyModel, 2> for Block {
-    fn set(&mut self, lane: usize, model: &EnergyModel, loaded: &Loaded<'_, 2>) {
+impl density::Derivatives<DevelopableEnergy, 2> for Block {
+    fn set(&mut self, lane: usize, model: &DevelopableEnergy, loaded: &Loaded<'_, 2>) {
         let Loaded {
             element,
             fields: [a, b],
-            poses: [first, second],
+            poses,
             wrench,
         } = loaded;
         let fields = Vector4::new(a[0], a[1], b[0], b[1]);
@@ -191,30 +235,24 @@ impl density::Derivatives<EnergyModel, 2> for Block {
         self.curl[lane] =
             (element.curl.bend != 0.0).then(|| element.curl_jet(*model, &fields, &across));
         let into = &mut self.input;
-        let put = |lanes: &mut [Lanes], values: &[f64]| {
-            for (lanes, value) in lanes.iter_mut().zip(values) {
-                lanes[lane] = *value;
-            }
-        };
         into.spans.set(lane, element, &fields);
-        put(&mut into.rigidity, &element.rigidity);
-        put(&mut into.frame, first.frame.as_slice());
-        put(&mut into.position, first.position.as_slice());
-        put(&mut into.next, second.position.as_slice());
-        put(&mut into.wrench, wrench.as_slice());
+        into.surroundings.set(lane, *poses, wrench);
+        put(&mut into.rigidity, lane, &element.rigidity);
         let across = &across.bending;
         let (gradient, hessian) = (&across.gradient, &across.hessian);
-        put(&mut into.across, &[across.value, gradient[0], gradient[1]]);
+        let values = [across.value, gradient[0], gradient[1]];
+        put(&mut into.across, lane, &values);
         put(
             &mut into.across[3..],
+            lane,
             &[hessian.m11, hessian.m12, hessian.m22],
         );
     }
 
-    fn find(&mut self, model: &EnergyModel) {
+    fn find(&mut self, model: &DevelopableEnergy) {
         match model {
-            EnergyModel::Fishbone => differentiate::<true>(&self.input, &mut self.output),
-            EnergyModel::Sadowsky | EnergyModel::Wunderlich => {
+            DevelopableEnergy::Fishbone => differentiate::<true>(&self.input, &mut self.output),
+            DevelopableEnergy::Sadowsky | DevelopableEnergy::Wunderlich => {
                 differentiate::<false>(&self.input, &mut self.output);
             }
         }
@@ -264,10 +302,10 @@ impl density::Derivatives<EnergyModel, 2> for Block {
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
 fn differentiate<const FISHBONE: bool>(input: &Input, output: &mut Output) {
     let model = match FISHBONE {
-        true => EnergyModel::Fishbone,
-        false => EnergyModel::Sadowsky,
+        true => DevelopableEnergy::Fishbone,
+        false => DevelopableEnergy::Sadowsky,
     };
-    let Even { cosine, cubic, .. } = Even::of(&input.spans);
+    let Even { cosine, cubic, .. } = Even::of::<Magnus>(&input.spans);
     for lane in 0..LANES {
         let (cosine, cubic) = (triple(&cosine, 0, lane), triple(&cubic, 0, lane));
         differentiate_lane(model, input, cosine, cubic, lane, output);
@@ -276,11 +314,15 @@ fn differentiate<const FISHBONE: bool>(input: &Input, output: &mut Output) {
 
 /// The motions of all lanes.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
-fn find_motions(spans: &Spans, frame: &mut [Lanes; 9], position: &mut [Lanes; 3]) {
-    let even = Even::of(spans);
+pub(in crate::strip) fn find_motions<S: Step>(
+    spans: &Spans,
+    frame: &mut [Lanes; 9],
+    position: &mut [Lanes; 3],
+) {
+    let even = Even::of::<S>(spans);
     for lane in 0..LANES {
-        let step = Magnus::at(spans, lane);
-        let (phi, rho) = (step.rotation, step.translation);
+        let step = S::at(spans, lane);
+        let (phi, rho) = (step.rotation(), step.translation());
         let [s, c, q] = [even.sine[lane], even.cosine[0][lane], even.cubic[0][lane]];
         let (square, along) = (dot(phi, phi), dot(phi, rho));
         let turned = cross(phi, rho);
@@ -303,15 +345,15 @@ fn find_motions(spans: &Spans, frame: &mut [Lanes; 9], position: &mut [Lanes; 3]
 }
 
 /// The even functions of the rotation of every lane, and their derivatives: [`Coefficients`].
-struct Even {
+pub(in crate::strip) struct Even {
     sine: Lanes,
-    cosine: [Lanes; 3],
-    cubic: [Lanes; 3],
+    pub(in crate::strip) cosine: [Lanes; 3],
+    pub(in crate::strip) cubic: [Lanes; 3],
 }
 
 impl Even {
     #[inline(always)]
-    fn of(spans: &Spans) -> Self {
+    pub(in crate::strip) fn of<S: Step>(spans: &Spans) -> Self {
         let mut even = Self {
             sine: NOTHING,
             cosine: [NOTHING; 3],
@@ -319,7 +361,7 @@ impl Even {
         };
         let mut square = NOTHING;
         for (lane, square) in square.iter_mut().enumerate() {
-            let rotation = Magnus::at(spans, lane).rotation;
+            let rotation = S::at(spans, lane).rotation();
             *square = dot(rotation, rotation);
             even.put(lane, &Coefficients::near(*square));
         }
@@ -329,7 +371,7 @@ impl Even {
             is_wide |= square > 1.0;
         }
         if is_wide {
-            even.put_exact(spans);
+            even.put_exact::<S>(spans);
         }
         even
     }
@@ -346,9 +388,9 @@ impl Even {
     /// The even functions of lanes whose rotations are too wide for the series.
     #[cold]
     #[inline(never)]
-    fn put_exact(&mut self, spans: &Spans) {
+    fn put_exact<S: Step>(&mut self, spans: &Spans) {
         for lane in 0..LANES {
-            let rotation = Magnus::at(spans, lane).rotation;
+            let rotation = S::at(spans, lane).rotation();
             self.put(lane, &Coefficients::at(dot(rotation, rotation)));
         }
     }

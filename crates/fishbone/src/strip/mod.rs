@@ -9,4 +9,5 @@ pub(crate) mod energy;
 pub(crate) mod flat;
 pub mod kernel;
 pub mod ribs;
+pub(crate) mod shell;
 pub mod spine;

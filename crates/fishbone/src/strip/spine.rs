@@ -1,8 +1,9 @@
 //! The solved centre line with its ribs, from which the surface and every report are drawn.
 
-use crate::geometry::{Pose, exp};
-use crate::strip::element::{increment, torsion};
+use crate::geometry::{Pose, exp, gauss_points};
+use crate::strip::element::{increment, increment_of, torsion};
 use crate::strip::ribs::rib_convergence;
+use crate::strip::shell::{Rib, RibCurve, interpolated};
 use nalgebra::{Vector3, Vector4};
 
 /// The piece of the belt between a node of the spine and the next.
@@ -55,8 +56,34 @@ pub struct Spine {
     pub pose: Vec<Pose>,
     /// Bend ω_ζ at every node; linear in between.
     pub bend: Vec<f64>,
-    /// Rib slope β = tan α at every node, Eq. (31); linear in between.
+    /// Rib slope β = tan α at every node, Eq. (31); linear in between, but for curved ribs.
     pub rib_slope: Vec<f64>,
+    /// The fields that curve the ribs of a strip of finite thickness; `None` where ribs are straight.
+    pub(crate) curved: Option<CurvedRibs>,
+}
+
+/// The fields of a strip of finite thickness beyond bend and rib slope, at every node of its spine.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct CurvedRibs {
+    /// Rate of the rib slope; the slope is cubic in between.
+    pub(crate) slope_rate: Vec<f64>,
+    /// Twist m along the rib, b(t,d); linear in between.
+    pub(crate) twist: Vec<f64>,
+    /// Bend q of the rib, b(d,d); cubic in between.
+    pub(crate) across: Vec<f64>,
+    /// Rate of the bend of the rib.
+    pub(crate) across_rate: Vec<f64>,
+}
+
+impl From<[Vec<f64>; 4]> for CurvedRibs {
+    fn from([slope_rate, twist, across, across_rate]: [Vec<f64>; 4]) -> Self {
+        Self {
+            slope_rate,
+            twist,
+            across,
+            across_rate,
+        }
+    }
 }
 
 /// The spine at one arc length.
@@ -70,6 +97,8 @@ pub(crate) struct SpinePoint {
     pub bend: f64,
     /// Rib slope β.
     pub rib_slope: f64,
+    /// How its rib curves; `None` where it is straight.
+    pub(crate) curve: Option<RibCurve>,
 }
 
 impl Spine {
@@ -98,6 +127,7 @@ impl Spine {
             u,
             bend,
             rib_slope,
+            curved: None,
         };
         for element in 0..spine.elements() {
             spine.pose[element + 1] = spine.pose_within(element, spine.element_length(element));
@@ -130,17 +160,25 @@ impl Spine {
         self.u.last().copied().unwrap_or(0.0) - self.u.first().copied().unwrap_or(0.0)
     }
 
-    /// Torsion ω_η = −β ω_ζ at every node.
+    /// Torsion ω_η at every node: −β ω_ζ, and the twist along curved ribs.
     ///
     /// Source: Eq. (32)
     pub(crate) fn torsion(&self) -> Vec<f64> {
         let fields = self.bend.iter().zip(&self.rib_slope);
-        fields.map(|(&bend, &slope)| torsion(bend, slope)).collect()
+        let twist = |node: usize| {
+            self.curved
+                .as_ref()
+                .map_or(0.0, |curved| curved.twist[node])
+        };
+        fields
+            .enumerate()
+            .map(|(node, (&bend, &slope))| torsion(bend, slope) + twist(node))
+            .collect()
     }
 
     /// Total torsion ∫ ω_η du.
     ///
-    /// Simpson's rule, exact for the product of two linear fields.
+    /// Simpson's rule, exact for the product of two linear fields, and of order four for curved ribs.
     ///
     /// Units: rad
     pub fn twist(&self) -> f64 {
@@ -176,7 +214,50 @@ impl Spine {
             pose: self.pose[index],
             bend: self.bend[index],
             rib_slope: self.rib_slope[index],
+            curve: self.curve_at_node(index),
         }
+    }
+
+    /// The curve of the rib at a node, by the flexible element that begins or ends there.
+    fn curve_at_node(&self, index: usize) -> Option<RibCurve> {
+        let is_strip =
+            |element: &usize| matches!(self.pieces.get(*element), Some(Piece::Strip { .. }));
+        let before = index.checked_sub(1).filter(is_strip);
+        match Some(index).filter(is_strip) {
+            Some(element) => self.curve(element, 0.0),
+            None => before.and_then(|element| self.curve(element, self.element_length(element))),
+        }
+    }
+
+    /// The curve of the rib inside an element; `None` where ribs are straight.
+    fn curve(&self, element: usize, distance: f64) -> Option<RibCurve> {
+        let rib = self.rib(element, distance)?;
+        Some(RibCurve {
+            twist: rib.twist,
+            across: rib.across,
+            convergence: rib.convergence,
+            growth: rib.growth,
+        })
+    }
+
+    /// What the curvature along a curved rib inside an element depends on; `None` where ribs are straight.
+    pub(crate) fn rib(&self, element: usize, distance: f64) -> Option<Rib<f64>> {
+        let curved = self.curved.as_ref()?;
+        let node = |node: usize| {
+            [
+                self.bend[node],
+                self.rib_slope[node],
+                curved.slope_rate[node],
+                curved.twist[node],
+                curved.across[node],
+                curved.across_rate[node],
+            ]
+        };
+        let length = self.element_length(element);
+        let t = if length > 0.0 { distance / length } else { 0.0 };
+        let geodesic = self.pieces[element].geodesic();
+        let (fields, rates) = interpolated([node(element), node(element + 1)], length, t);
+        Some(Rib::of(&fields, &rates, geodesic))
     }
 
     /// The flexible elements: neither joints, which have no length, nor stiffeners, which have no ribs.
@@ -187,7 +268,7 @@ impl Spine {
         })
     }
 
-    /// Rib convergence s inside an element, at a point of given rib slope.
+    /// Rib convergence s inside an element with straight ribs, at a point of given rib slope.
     pub(crate) fn convergence(&self, element: usize, rib_slope: f64) -> f64 {
         let rise = self.rib_slope[element + 1] - self.rib_slope[element];
         let rate = rise / self.element_length(element);
@@ -196,6 +277,9 @@ impl Spine {
 
     /// Rib convergence s in the middle of an element.
     pub(crate) fn mean_convergence(&self, element: usize) -> f64 {
+        if let Some(rib) = self.rib(element, 0.5 * self.element_length(element)) {
+            return rib.convergence;
+        }
         let mean = 0.5 * (self.rib_slope[element] + self.rib_slope[element + 1]);
         self.convergence(element, mean)
     }
@@ -221,11 +305,15 @@ impl Spine {
             pose: self.pose_within(element, distance),
             bend,
             rib_slope,
+            curve: self.curve(element, distance),
         }
     }
 
     /// Bend and rib slope inside an element.
     pub(crate) fn fields(&self, element: usize, distance: f64) -> (f64, f64) {
+        if let Some(rib) = self.rib(element, distance) {
+            return (-rib.bend, rib.slope);
+        }
         let fraction = distance / self.element_length(element);
         let between = |field: &[f64]| match fraction.is_finite() {
             true => field[element] + fraction * (field[element + 1] - field[element]),
@@ -235,6 +323,13 @@ impl Spine {
     }
 
     fn pose_within(&self, element: usize, distance: f64) -> Pose {
+        if self.curved.is_some()
+            && let Piece::Strip { geodesic } = self.pieces[element]
+        {
+            let at = |t: f64| self.bend_and_torsion(element, t * distance);
+            let step = increment_of(distance, geodesic, gauss_points().map(at));
+            return self.pose[element] * step;
+        }
         let (bend, slope) = (self.bend[element], self.rib_slope[element]);
         let (bend_there, slope_there) = self.fields(element, distance);
         let fields = Vector4::new(bend, slope, bend_there, slope_there);
@@ -248,12 +343,20 @@ impl Spine {
             }
     }
 
+    /// Bend and torsion inside an element.
+    fn bend_and_torsion(&self, element: usize, distance: f64) -> [f64; 2] {
+        match self.rib(element, distance) {
+            Some(rib) => [-rib.bend, rib.torsion()],
+            None => {
+                let (bend, rib_slope) = self.fields(element, distance);
+                [bend, torsion(bend, rib_slope)]
+            }
+        }
+    }
+
     fn element_twist(&self, element: usize) -> f64 {
         let length = self.element_length(element);
-        let at = |distance: f64| {
-            let (bend, rib_slope) = self.fields(element, distance);
-            torsion(bend, rib_slope)
-        };
+        let at = |distance: f64| self.bend_and_torsion(element, distance)[1];
         length / 6.0 * (at(0.0) + 4.0 * at(0.5 * length) + at(length))
     }
 }

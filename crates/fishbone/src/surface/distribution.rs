@@ -4,6 +4,7 @@
 //! exceeded on a given share of the area converges.
 
 use super::curvature::curvature;
+use super::curved::{Bent, bends};
 use super::extremes::{Part, smooth_parts};
 use crate::board::feet::Board;
 use crate::board::outline::outline;
@@ -20,6 +21,8 @@ const RADII: [f64; 2] = [1e-12, 1e12];
 #[derive(Debug, Clone)]
 pub struct BendDistribution {
     cells: Vec<Cell>,
+    /// Points of a strip of finite thickness, in place of cells.
+    bends: Vec<Bent>,
     /// Area of the board.
     area: f64,
     /// Width of the board.
@@ -34,12 +37,13 @@ impl BendDistribution {
     /// If the spine has no nodes.
     pub fn of(spine: &Spine) -> Self {
         let board = Board::of(spine);
-        let parts = spine
-            .strips()
+        let straight = spine.strips().filter(|_| spine.curved.is_none());
+        let parts = straight
             .flat_map(|element| smooth_parts(spine, &board, element))
             .flat_map(|part| parts_of_one_sign(spine, part));
         Self {
             cells: parts.flat_map(|part| cells(spine, &board, part)).collect(),
+            bends: bends(spine),
             area: outline(spine).area(),
             width: spine.width,
         }
@@ -48,7 +52,9 @@ impl BendDistribution {
     /// Share of the board's area with a bend radius below a finite one.
     pub fn share_below(&self, radius: f64) -> f64 {
         let areas = self.cells.iter().map(|cell| cell.area_below(radius));
-        areas.sum::<f64>() / self.area
+        let tighter = self.bends.iter().filter(|bent| bent.radius.value < radius);
+        let points = tighter.map(|bent| bent.area).sum::<f64>();
+        (areas.sum::<f64>() + points) / self.area
     }
 
     /// Radii exceeded on 99.9, 99 and 95 % of the board's area.

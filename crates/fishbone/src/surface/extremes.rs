@@ -1,6 +1,7 @@
 //! Highest point, tightest bend, narrowest margin.
 
 use super::curvature::{bend_radius, curvature};
+use super::curved::{bends, radii_on_spine};
 use crate::board::feet::Board;
 use crate::strip::flat::FLAT;
 use crate::strip::ribs::rib_convergence_bound;
@@ -123,7 +124,11 @@ pub fn least_spine_radius(spine: &Spine) -> Option<SpineRadius> {
     let radii = (0..spine.u.len())
         .map(at_node)
         .chain(spine.strips().flat_map(inside));
-    let least = radii.min_by(|a, b| a.value.total_cmp(&b.value));
+    let radii: Vec<SpineRadius> = match spine.curved {
+        Some(_) => radii_on_spine(spine),
+        None => radii.collect(),
+    };
+    let least = radii.into_iter().min_by(|a, b| a.value.total_cmp(&b.value));
     least.filter(|radius| radius.value * FLAT < spine.length())
 }
 
@@ -176,9 +181,14 @@ const SAMPLES: usize = 8;
 /// The least radius of bend over the whole width, (1 − v s)/|κ₁|; `None` where the belt is flat all over, as for
 /// [`least_spine_radius`].
 ///
-/// The tightest point of a rib is the end towards which the ribs converge.
+/// The tightest point of a straight rib is the end towards which the ribs converge. Of a strip of finite thickness the radius is
+/// that of the strip without the layers along its free edges.
 pub fn least_bend_radius(spine: &Spine) -> Option<BendRadius> {
     least_spine_radius(spine)?;
+    if spine.curved.is_some() {
+        let radii = bends(spine).into_iter().map(|bent| bent.radius);
+        return radii.min_by(|a, b| a.value.total_cmp(&b.value));
+    }
     let board = Board::of(spine);
     let parts = spine
         .strips()

@@ -132,6 +132,7 @@ mod tests {
             pose: (0..=nodes).map(pose).collect(),
             bend: vec![-1.0; nodes + 1],
             rib_slope: vec![torsion; nodes + 1],
+            curved: None,
         }
     }
 

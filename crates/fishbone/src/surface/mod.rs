@@ -5,6 +5,7 @@
 //! out in [`crate::board`].
 
 mod curvature;
+mod curved;
 mod distribution;
 mod extremes;
 pub mod linking;

@@ -4,6 +4,7 @@ use super::locate::locate;
 use crate::board::feet::{Board, End, Foot};
 use crate::board::flat::FlatFrame;
 use crate::geometry::Pose;
+use crate::strip::shell::RibCurve;
 use crate::strip::spine::Spine;
 use nalgebra::{Vector2, Vector3};
 
@@ -42,15 +43,6 @@ pub fn bend_vector(pose: &Pose, rib_slope: f64) -> Vector3<f64> {
     pose.frame * Vector3::new(0.0, 1.0, rib_slope) / 1f64.hypot(rib_slope)
 }
 
-/// Arc length, along the line v, at which the rib through P(u) meets this line: u' = u − v β.
-///
-/// For v = +V/2 the source prints u + (V/2) tan α, which contradicts its Eq. (20).
-///
-/// Source: Eq. (22), sign corrected
-pub fn edge_foot(u: f64, rib_slope: f64, v: f64) -> f64 {
-    u - v * rib_slope
-}
-
 /// The greatest |dα/du| for which the ribs of a straight belt do not cross inside the width.
 ///
 /// Source: Eq. (28)
@@ -73,6 +65,8 @@ pub struct Rib {
     pub v_minus: f64,
     /// Coordinate of its end on the +ζ side, v ≥ 0.
     pub v_plus: f64,
+    /// How it curves; `None` of a straight rib.
+    pub(crate) curve: Option<RibCurve>,
 }
 
 impl Rib {
@@ -95,14 +89,18 @@ impl Rib {
             slope: foot.point.rib_slope,
             v_minus: minus.v,
             v_plus: plus.v,
+            curve: foot.point.curve,
         }
     }
 
-    /// The point v of the rib, x(u) + v (ζ − β η).
+    /// The point v of the rib, x(u) + v (ζ − β η) of a straight one.
     ///
     /// Source: Eq. (20), (21)
     pub(crate) fn point(&self, v: f64) -> Vector3<f64> {
-        self.pose.transform(&Vector3::new(0.0, -v * self.slope, v))
+        match &self.curve {
+            Some(curve) => (self.pose * curve.motion(self.slope, v)).position,
+            None => self.pose.transform(&Vector3::new(0.0, -v * self.slope, v)),
+        }
     }
 
     /// The same point of the flat board, (y, z).
@@ -179,8 +177,14 @@ pub fn points(spine: &Spine, n_across: usize) -> Vec<Vec<Vector3<f64>>> {
 pub fn material_point(spine: &Spine, y: f64, z: f64) -> Option<Vector3<f64>> {
     let place = locate(spine, &Vector2::new(y, z))?;
     let local = place.foot.flat.local(&place.point);
-    let pose = place.foot.point.pose;
-    Some(pose.transform(&Vector3::new(0.0, local.x, local.y)))
+    let foot = &place.foot.point;
+    let Some(curve) = &foot.curve else {
+        return Some(foot.pose.transform(&Vector3::new(0.0, local.x, local.y)));
+    };
+    // Beyond the last rib the surface is the tangent plane along it.
+    let beyond = local.x + local.y * foot.rib_slope;
+    let there = foot.pose * curve.motion(foot.rib_slope, local.y);
+    Some(there.transform(&Vector3::new(0.0, beyond, 0.0)))
 }
 
 /// Arc length of the foot of the rib through the flat point (y, z), that of the nearest rib where the board is flat

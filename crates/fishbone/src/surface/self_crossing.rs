@@ -149,6 +149,7 @@ fn trimmed(spine: &Spine, parts: usize) -> Spine {
         pose: nodes.iter().map(|node| node.pose).collect(),
         bend: nodes.iter().map(|node| node.bend).collect(),
         rib_slope: nodes.iter().map(|node| node.rib_slope).collect(),
+        curved: None,
     }
 }
 
@@ -181,6 +182,7 @@ fn thinned(spine: &Spine, parts: usize) -> Spine {
         pose: kept.iter().map(|&node| spine.pose[node]).collect(),
         bend: kept.iter().map(|&node| spine.bend[node]).collect(),
         rib_slope: kept.iter().map(|&node| spine.rib_slope[node]).collect(),
+        curved: None,
     }
 }
 

@@ -98,16 +98,20 @@ impl<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> Primal
         linear.add_slack_gradients(|row| -multipliers[row], &mut self.gradient);
         linear.gather_gradient(&mut self.gradient);
         let rounding = |node: usize| self.program.rounding(&self.point, node);
-        let nodes = self.gradient.iter().enumerate();
-        let beyond = nodes.map(|(node, gradient)| {
+        let mut most = 0.0;
+        for (node, gradient) in self.gradient.iter().enumerate() {
+            // Rounding makes entries smaller: those that are too small anyway need no look at it.
+            if largest(gradient.iter()) <= most {
+                continue;
+            }
             let mut beyond = *gradient;
             let by_controls = linear.gradient_change(node, rounding);
             for (entry, rounded) in beyond.iter_mut().skip(X).zip(&by_controls) {
                 *entry = beyond_rounding(*entry, *rounded);
             }
-            largest(beyond.iter())
-        });
-        beyond.fold(0.0, larger)
+            most = larger(most, largest(beyond.iter()));
+        }
+        most
     }
 
     fn complementarity(&self, parameter: f64) -> f64 {

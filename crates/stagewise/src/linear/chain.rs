@@ -15,10 +15,10 @@ mod solve;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use factor::Factor;
+pub(crate) use factor::{Damping, Factor};
 
 use super::pair_matrix::StageMatrix;
-use columns::{add_scaled, dot_states};
+use columns::{add_scaled, dot_states, weighted};
 use nalgebra::{SMatrix, SVector};
 
 /// Unknowns of a node: its state, then its controls.
@@ -39,9 +39,9 @@ pub struct Stage<const U: usize, const N: usize> {
     pub state_first: ByControls<U, N>,
     /// Second derivative by the state and the second controls; its last `U` rows are zero.
     pub state_second: ByControls<U, N>,
-    /// How the second controls follow the first, one by one: `control⁺ = tie · control` plus a free part.
-    pub tie: [f64; U],
-    /// Which of the second controls have a free part. A control with neither tie nor free part is locked.
+    /// How the second controls follow the first: `controls⁺ = tie · controls` plus a free part; `None` where none follows.
+    pub tie: Option<SMatrix<f64, U, U>>,
+    /// Which of the second controls have a free part. A control that has none and follows no other is locked.
     pub free: [bool; U],
 }
 
@@ -56,7 +56,7 @@ impl<const U: usize, const N: usize> Stage<U, N> {
             growth_by_second: ByControls::zeros(),
             state_first: ByControls::zeros(),
             state_second: ByControls::zeros(),
-            tie: [0.0; U],
+            tie: None,
             free: [true; U],
         }
     }
@@ -77,6 +77,26 @@ impl<const U: usize, const N: usize> Stage<U, N> {
         }
         next[Self::X..].copy_from_slice(&second);
         next
+    }
+
+    /// Adds to the second controls the part that follows the first.
+    #[inline(always)]
+    fn add_following(&self, first: &[f64], second: &mut [f64; U]) {
+        if let Some(tie) = &self.tie {
+            for i in 0..U {
+                second[i] += weighted::<U>(|j| tie[(i, j)], |j| first[j]);
+            }
+        }
+    }
+
+    /// Adds to a gradient by the first controls that by the second ones which follow them.
+    #[inline(always)]
+    fn fold(&self, by_second: &[f64; U], by_first: &mut [f64]) {
+        if let Some(tie) = &self.tie {
+            for j in 0..U {
+                by_first[j] += weighted::<U>(|i| tie[(i, j)], |i| by_second[i]);
+            }
+        }
     }
 }
 
@@ -122,13 +142,13 @@ impl<const U: usize, const N: usize> Chain<U, N> {
     /// Size of the state.
     const X: usize = N - U;
 
-    /// Turns a gradient by all controls into a gradient by the free controls: entries of tied controls move to the control
+    /// Turns a gradient by all controls into a gradient by the free controls: entries of tied controls move to the controls
     /// before, and entries of locked controls become zero.
     pub fn fold(&self, gradient: &mut [NodeVector<N>]) {
         for (k, stage) in self.stages.iter().enumerate().rev() {
+            let by_second = std::array::from_fn(|i| gradient[k + 1][Self::X + i]);
+            stage.fold(&by_second, &mut gradient[k].as_mut_slice()[Self::X..]);
             for i in 0..U {
-                let by_second = gradient[k + 1][Self::X + i];
-                gradient[k][Self::X + i] += stage.tie[i] * by_second;
                 if !stage.free[i] {
                     gradient[k + 1][Self::X + i] = 0.0;
                 }
@@ -161,15 +181,13 @@ impl<const U: usize, const N: usize> Chain<U, N> {
     /// Carries the states of a step along the chain from its first state and its controls.
     pub fn carry(&self, step: &mut [NodeVector<N>]) {
         for (k, stage) in self.stages.iter().enumerate() {
-            let second = std::array::from_fn(|i| {
-                let free = if stage.free[i] {
-                    step[k + 1][Self::X + i]
-                } else {
-                    0.0
-                };
-                stage.tie[i] * step[k][Self::X + i] + free
+            let node = &step[k].data.0[0];
+            let mut second = std::array::from_fn(|i| match stage.free[i] {
+                true => step[k + 1][Self::X + i],
+                false => 0.0,
             });
-            step[k + 1] = NodeVector::from(stage.carry(&step[k].data.0[0], second));
+            stage.add_following(&node[Self::X..], &mut second);
+            step[k + 1] = NodeVector::from(stage.carry(node, second));
         }
     }
 

@@ -77,8 +77,9 @@ impl<const X: usize, const U: usize, const N: usize> Linearisation<X, U, N> {
         let mut cost_free = self.cost_free_controls();
         for (k, stage) in self.chain.stages.iter().enumerate().rev() {
             let next = cost_free[k + 1];
+            let Some(tie) = stage.tie else { continue };
             for (i, cost_free) in cost_free[k].iter_mut().enumerate() {
-                *cost_free &= stage.tie[i] == 0.0 || next[i];
+                *cost_free &= (0..U).all(|follower| tie[(follower, i)] == 0.0 || next[follower]);
             }
         }
         let mut held = 0;
@@ -162,7 +163,7 @@ fn maxima(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
 mod tests {
     use super::*;
     use crate::layout::Layout;
-    use nalgebra::Vector3;
+    use nalgebra::{Matrix2, Vector3};
 
     /// A chain whose first control moves the state and whose second one costs, by a share of a stage each.
     fn chain(second: impl Fn(usize) -> f64) -> Linearisation<1, 2, 3> {
@@ -192,5 +193,17 @@ mod tests {
         let free = linear.chain.stages.iter().map(|stage| stage.free);
         assert!(free.clone().all(|free| free[0]));
         assert_eq!(free.filter(|free| !free[1]).count(), 39);
+    }
+
+    #[test]
+    fn test_control_is_cost_free_where_all_that_follow_it_are() {
+        let held = |tie: Matrix2<f64>| {
+            let mut linear = chain(|k| if k < 40 { 1e-12 } else { 1.0 });
+            linear.chain.stages[20].tie = Some(tie);
+            linear.hold_cost_free_controls()
+        };
+        // Beyond the stage the first control moves the state, and the second changes nothing.
+        assert_eq!(held(Matrix2::new(0.5, 0.0, 0.5, 0.5)), 40);
+        assert_eq!(held(Matrix2::new(0.5, 0.5, 0.5, 0.5)), 39);
     }
 }

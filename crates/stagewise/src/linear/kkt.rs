@@ -16,7 +16,7 @@ mod tests;
 
 use super::TooConcave;
 use super::border::{Border, Row};
-use super::chain::{Diagonal, Factor, NodeMatrix, NodeVector};
+use super::chain::{Damping, Diagonal, Factor, NodeMatrix, NodeVector};
 use crate::layout::{Block, Layout};
 use crate::linearisation::{Linearisation, product};
 use crate::program::{Multipliers, Program, Values};
@@ -50,6 +50,7 @@ pub(crate) struct Kkt<const X: usize, const U: usize, const N: usize> {
     /// The border of the exact factorisation: all equalities, then the other rows of pairs.
     exact: Option<Border<N>>,
     node_weights: Vec<f64>,
+    control_weights: [f64; U],
     /// Damping that the last concave second derivative took.
     damping: f64,
     /// Damping of the present factorisation.
@@ -88,6 +89,7 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
             diagonal: linear.diagonal.clone(),
             factor: Factor::new(layout.stages()),
             node_weights: layout.node_weights(),
+            control_weights: std::array::from_fn(|i| layout.control_weight(i)),
             damping: 0.0,
             factor_damping: 0.0,
             right: zeros.clone(),
@@ -266,10 +268,14 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
     pub(crate) fn factorise_damped(&mut self, damping: f64) -> Result<(), TooConcave> {
         self.exact = None;
         self.factor_damping = damping;
+        let damping = Damping {
+            strength: damping,
+            nodes: &self.node_weights,
+            controls: self.control_weights,
+        };
         if self.is_rigid {
             let (chain, factor, most) = (&self.linear.chain, &mut self.factor, usize::MAX);
-            let concave =
-                chain.factorise(&self.diagonal, damping, &self.node_weights, most, factor)?;
+            let concave = chain.factorise(&self.diagonal, &damping, most, factor)?;
             let concave = concave + self.border.concave_rows();
             return match self.hold_exactly()? >= concave {
                 true => Ok(()),
@@ -278,7 +284,7 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         }
         let (chain, factor) = (&self.linear.chain, &mut self.factor);
         let most = self.border.rows.len();
-        let concave = chain.factorise(&self.diagonal, damping, &self.node_weights, most, factor)?;
+        let concave = chain.factorise(&self.diagonal, &damping, most, factor)?;
         let held = self.border.factorise(chain, factor, COMPLIANCE)?;
         match concave + self.border.concave_rows() == held {
             true => Ok(()),
@@ -316,7 +322,8 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
 
     fn factorise_chain(&mut self) -> Result<usize, TooConcave> {
         let (chain, factor) = (&self.linear.chain, &mut self.factor);
-        chain.factorise(&self.diagonal, 0.0, &self.node_weights, usize::MAX, factor)
+        let undamped = Damping::none(&self.node_weights);
+        chain.factorise(&self.diagonal, &undamped, usize::MAX, factor)
     }
 
     /// A border of all equalities and of the other rows of pairs.
@@ -346,7 +353,12 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         self.diagonal.clone_from(&self.linear.diagonal);
         self.assemble_nodes();
         let (chain, factor) = (&self.linear.chain, &mut self.factor);
-        let factorised = chain.factorise(&self.diagonal, 1.0, &weights, 0, factor);
+        let identity = Damping {
+            strength: 1.0,
+            nodes: &weights,
+            controls: self.control_weights,
+        };
+        let factorised = chain.factorise(&self.diagonal, &identity, 0, factor);
         factorised.ok()?;
         self.assemble_border();
         let mut border = self.all_rows();

@@ -216,5 +216,5 @@ const PLACES: usize = 80;
 
 /// The solutions of two equilibria, if both have one.
 fn solved<'a>(a: &'a Equilibrium, b: &'a Equilibrium) -> Option<[&'a Solved; 2]> {
-    Some([a.solved.as_ref()?, b.solved.as_ref()?])
+    Some([a.developable()?, b.developable()?])
 }

@@ -2,7 +2,7 @@
 
 use crate::geometry::gauss_points;
 use crate::strip::bounds::{ActiveEdges, Edge, RibBounds};
-use crate::strip::developable::EnergyModel;
+use crate::strip::developable::DevelopableEnergy;
 use crate::strip::element::Curl;
 use crate::strip::element::Element;
 use crate::strip::ribs::{Across, Strips};
@@ -32,7 +32,7 @@ impl ByData {
     pub(super) fn at(
         element: &Element,
         bounds: &RibBounds,
-        model: EnergyModel,
+        model: DevelopableEnergy,
         fields: &Vector4<f64>,
         multipliers: &[f64],
     ) -> Self {
@@ -79,7 +79,7 @@ impl ByData {
 /// The energy of an element with other data.
 fn energy<D: DualNum<Primitive = f64> + Copy>(
     element: &Element,
-    model: EnergyModel,
+    model: DevelopableEnergy,
     fields: [D; 4],
     data: [D; 4],
 ) -> D {
@@ -161,11 +161,16 @@ mod tests {
                 bend: 2.0,
                 poisson: 0.3,
             },
+            stretching: f64::INFINITY,
         }
     }
 
     /// Energy and its gradient by the fields.
-    fn energy(element: &Element, model: EnergyModel, fields: &Vector4<f64>) -> (f64, Vector4<f64>) {
+    fn energy(
+        element: &Element,
+        model: DevelopableEnergy,
+        fields: &Vector4<f64>,
+    ) -> (f64, Vector4<f64>) {
         let [a, b] = [0, 2].map(|from| fields.fixed_rows::<2>(from).into_owned());
         let mut block = Block::default();
         let loaded = Loaded {
@@ -253,9 +258,9 @@ mod tests {
             other
         };
         for model in [
-            EnergyModel::Fishbone,
-            EnergyModel::Sadowsky,
-            EnergyModel::Wunderlich,
+            DevelopableEnergy::Fishbone,
+            DevelopableEnergy::Sadowsky,
+            DevelopableEnergy::Wunderlich,
         ] {
             let lagrangian = |element: &Element| {
                 let (mut value, mut gradient) = energy(element, model, &fields);

@@ -437,7 +437,7 @@ fn an_unknown_field_is_named_with_its_path_and_the_field_meant() {
         (
             "width = 0.1",
             "widht = 0.1",
-            "belt.widht: unknown field, did you mean \"width\"? allowed: width, rigidity, material, layers, poisson, \
+            "belt.widht: unknown field, did you mean \"width\"? allowed: width, rigidity, material, layers, thickness, poisson, \
              natural_bend, density, closed, half_turns, segments",
         ),
         (
@@ -491,12 +491,12 @@ fn an_unknown_word_is_named_with_the_words_allowed() {
         (
             "energy = \"sadowsky\"",
             "energy = \"wunderlch\"",
-            "energy: found \"wunderlch\", allowed: fishbone, sadowsky, wunderlich (did you mean \"wunderlich\"?)",
+            "energy: found \"wunderlch\", allowed: fishbone, sadowsky, wunderlich, shell (did you mean \"wunderlich\"?)",
         ),
         (
             "energy = \"sadowsky\"",
             "energy = \"elastica\"",
-            "energy: found \"elastica\", allowed: fishbone, sadowsky, wunderlich",
+            "energy: found \"elastica\", allowed: fishbone, sadowsky, wunderlich, shell",
         ),
         (
             "method = \"intrinsic\"",
@@ -537,7 +537,7 @@ fn a_wrong_type_is_named_with_the_type_found_and_the_types_allowed() {
         (
             "energy = \"sadowsky\"",
             "energy = 1",
-            "energy: found 1, must be one of fishbone, sadowsky, wunderlich",
+            "energy: found 1, must be one of fishbone, sadowsky, wunderlich, shell",
         ),
         (
             "width = 0.1",
@@ -1504,7 +1504,7 @@ fn an_error_carries_its_parts() {
         panic!("{error:?}");
     };
     assert_eq!(nearest.as_deref(), Some("width"));
-    assert_eq!(allowed.len(), 10);
+    assert_eq!(allowed.len(), 11);
     assert_eq!(Scenario::from_toml("=").unwrap_err().field(), None);
 }
 
@@ -1622,7 +1622,7 @@ fn a_long_word_is_cut_in_the_message() {
     assert_eq!(
         long,
         format!(
-            "energy: found \"{}…\", allowed: fishbone, sadowsky, wunderlich",
+            "energy: found \"{}…\", allowed: fishbone, sadowsky, wunderlich, shell",
             "é".repeat(60)
         )
     );

@@ -1,10 +1,11 @@
 //! The programme's values and derivatives, for the solver.
 
-use super::{BeltPoint, BeltProgram, DeadForce, Piece, ROWS, add_wrench, rows_of, slopes_of};
+use super::{BeltPoint, BeltProgram, DeadForce, Piece, ROWS, add_wrench, rows_of};
 use crate::geometry::{Pose, Twist, hat};
 use crate::strip::density::{Density, Derivatives, LANES, Loaded};
 use crate::strip::element::Element;
-use nalgebra::{Matrix3, Matrix3x6, Matrix6, SVector, Vector6};
+use nalgebra::{Matrix3, Matrix3x6, Matrix6, SMatrix, SVector, Vector6};
+use num_dual::{Dual64, HyperDual64};
 use stagewise::{
     Layout, Linearisation, Multipliers, NodeVector, Program, Residuals, StageMatrix, Values,
 };
@@ -18,10 +19,13 @@ impl<D: Density<F>, const F: usize, const N: usize> Program<6, F, N> for BeltPro
             Piece::Rigid { .. } | Piece::Joint { .. } => 0.0,
         };
         let bounds = |(k, piece): (usize, &Piece)| match piece {
-            Piece::Strip(element) => self.bounds(k, element).places().count(),
+            Piece::Strip(element) => self.model.inequalities(element, &self.edges[k]),
             Piece::Rigid { .. } | Piece::Joint { .. } => 0,
         };
+        let half_width = self.elements().map(|(_, element)| element.half_width);
+        let controls = self.model.weights(half_width.fold(0.0, f64::max));
         let layout = Layout::new(self.pieces.iter().map(weight).collect())
+            .with_control_weights(controls.into())
             .with_stage_inequalities(self.pieces.iter().enumerate().map(bounds));
         let supports = self.supports.iter();
         let layout = supports.fold(layout, |layout, support| {
@@ -48,14 +52,9 @@ impl<D: Density<F>, const F: usize, const N: usize> Program<6, F, N> for BeltPro
     fn evaluate(&self, point: &mut BeltPoint<F>, values: &mut Values) -> bool {
         values.slacks.clear();
         for (k, element) in self.elements() {
-            let bounds = self.bounds(k, element);
-            let [plus, minus, active @ ..] = bounds.slacks(slopes_of(&point.fields, k));
-            values.slacks.extend([plus, minus]);
-            for (slack, edge) in active.into_iter().zip(bounds.edges) {
-                if edge.is_some() {
-                    values.slacks.push(slack);
-                }
-            }
+            let ends = [&point.fields[k], &point.fields[k + 1]];
+            let slacks = &mut values.slacks;
+            self.model.slacks(element, &self.edges[k], ends, slacks);
         }
         values.equalities.clear();
         if self.rib_leaves_through_bend(point) {
@@ -108,6 +107,7 @@ impl<D: Density<F>, const F: usize, const N: usize> Program<6, F, N> for BeltPro
                 self.linearise_tie(k, point, bounds, into);
             }
         }
+        self.linearise_steps(point, bounds, into);
         for by_node in &mut into.gradient[1..] {
             by_node.fixed_rows_mut::<6>(0).fill(0.0);
         }
@@ -125,12 +125,9 @@ impl<D: Density<F>, const F: usize, const N: usize> Program<6, F, N> for BeltPro
         into: &mut BeltPoint<F>,
     ) {
         for (k, step) in step.iter().enumerate() {
-            into.fields[k] = point.fields[k] + length * step.fixed_rows::<F>(6);
-            if self.is_tied(k)
-                && let Some([slope, ..]) = self.carried_slope(into, k)
-            {
-                into.fields[k][1] = slope;
-            }
+            let step = length * step.fixed_rows::<F>(6);
+            into.fields[k] = self.model.moved(&point.fields[k], &step);
+            self.carry_across(into, k);
         }
         let twist = Twist::from_vector(&(length * step[0].fixed_rows::<6>(0)));
         into.poses[0] = Pose::exp(&twist) * point.poses[0];
@@ -235,6 +232,30 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         }
     }
 
+    /// Second derivatives of the curves along which the fields of nodes move.
+    fn linearise_steps(
+        &self,
+        point: &BeltPoint<F>,
+        bounds: &[f64],
+        into: &mut Linearisation<6, F, N>,
+    ) {
+        let last = self.pieces.len();
+        for (node, fields) in point.fields.iter().enumerate() {
+            if self.is_tied(node) {
+                continue;
+            }
+            let mut gradient = by_fields(node, bounds, into);
+            if let Some(tie) = into.chain.stages.get(node).and_then(|stage| stage.tie) {
+                gradient += tie.tr_mul(&by_fields(node + 1, bounds, into));
+            }
+            let own = match node == last {
+                true => &mut into.diagonal.controls[node - 1].second,
+                false => &mut into.diagonal.controls[node].first,
+            };
+            self.model.add_curvature_of_steps(fields, &gradient, own);
+        }
+    }
+
     /// Gradients of the bounds of an element's ribs; subtracts their second derivatives from the Hessian by the element's
     /// fields.
     fn linearise_bounds(
@@ -246,22 +267,16 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         controls: &mut StageMatrix<F>,
         into: &mut Linearisation<6, F, N>,
     ) {
-        let bounds = self.bounds(k, element);
-        let slacks = bounds.slack_jets(slopes_of(&point.fields, k));
-        let are_linear = bounds.are_linear();
         let rows = into.layout().stage_rows(k);
-        for (row, place) in rows.zip(bounds.places()) {
-            let slack = &slacks[place];
-            if !are_linear {
-                controls.first[(1, 1)] -= multipliers[row] * slack.hessian[(0, 0)];
-                controls.mixed[(1, 1)] -= multipliers[row] * slack.hessian[(0, 1)];
-                controls.second[(1, 1)] -= multipliers[row] * slack.hessian[(1, 1)];
-            }
-            let gradient = &mut into.stage_slacks[row];
-            gradient[0].fill(0.0);
-            gradient[1].fill(0.0);
-            (gradient[0][1], gradient[1][1]) = (slack.gradient[0], slack.gradient[1]);
-        }
+        let ends = [&point.fields[k], &point.fields[k + 1]];
+        self.model.linearise_slacks(
+            element,
+            &self.edges[k],
+            ends,
+            &multipliers[rows.clone()],
+            &mut into.stage_slacks[rows],
+            controls,
+        );
     }
 
     /// Gradients and second derivatives of the obstacles' gaps. The contacts' wrench is added to the gradient of the
@@ -308,7 +323,7 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         }
     }
 
-    /// The slope carried on across a joint: its derivative, and the second derivative that it adds.
+    /// The fields carried on across a joint: their derivatives, and the second derivative that they add.
     fn linearise_tie(
         &self,
         k: usize,
@@ -316,19 +331,32 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         bounds: &[f64],
         into: &mut Linearisation<6, F, N>,
     ) {
-        let Some([_, first, second]) = self.carried_slope(point, k + 1) else {
-            return;
-        };
-        let mut generalised_force = into.gradient[k + 1][7];
-        if k + 1 < self.pieces.len() {
-            for row in into.layout().stage_rows(k + 1) {
-                generalised_force -= bounds[row] * into.stage_slacks[row][0][1];
+        let (fields, tied) = (point.fields[k].data.0[0], self.tied(k + 1));
+        let forces = by_fields(k + 1, bounds, into);
+        let tie = into.chain.stages[k].tie.insert(SMatrix::zeros());
+        let own = &mut into.diagonal.controls[k];
+        *own = StageMatrix::zeros();
+        for a in 0..F {
+            let mut seeded = fields.map(Dual64::from);
+            seeded[a].eps = 1.0;
+            let Some(beyond) = self.beyond(k + 1, &seeded) else {
+                return;
+            };
+            for i in 0..F {
+                tie[(i, a)] = if tied[i] { beyond[i].eps } else { 0.0 };
+            }
+            for b in 0..F {
+                let mut seeded = fields.map(HyperDual64::from);
+                (seeded[a].eps1, seeded[b].eps2) = (1.0, 1.0);
+                let beyond = self.beyond(k + 1, &seeded);
+                let terms = beyond.into_iter().flatten().zip(&forces).zip(tied);
+                let second = terms.map(|((beyond, force), tied)| match tied {
+                    true => beyond.eps1eps2 * force,
+                    false => 0.0,
+                });
+                own.first[(a, b)] = second.sum();
             }
         }
-        into.chain.stages[k].tie = [0.0; F];
-        into.chain.stages[k].tie[1] = first;
-        into.diagonal.controls[k] = StageMatrix::zeros();
-        into.diagonal.controls[k].first[(1, 1)] = second * generalised_force;
     }
 
     /// Derivatives of supports, links and loads at their nodes; second derivatives by the nodes' states.
@@ -372,4 +400,21 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
             }
         }
     }
+}
+
+/// Gradient by the fields of a node, with the inequalities of the pieces beside it.
+fn by_fields<const F: usize, const N: usize>(
+    node: usize,
+    bounds: &[f64],
+    into: &Linearisation<6, F, N>,
+) -> SVector<f64, F> {
+    let mut gradient = into.gradient[node].fixed_rows::<F>(6).into_owned();
+    for (stage, end) in [(node.checked_sub(1), 1), (Some(node), 0)] {
+        if let Some(stage) = stage.filter(|stage| *stage < into.layout().stages()) {
+            for row in into.layout().stage_rows(stage) {
+                gradient -= bounds[row] * into.stage_slacks[row][end];
+            }
+        }
+    }
+    gradient
 }

@@ -21,8 +21,8 @@ pub enum Tie {
     Offset(Vector3<f64>),
     /// Pose: the same position, the frame turned by a rotation in body axes.
     Pose(UnitQuaternion<f64>),
-    /// Bend and rib slope, each by a factor; `None` where it does not follow.
-    Fields([Option<f64>; 2]),
+    /// Fields in their order, each by a factor; `None` where it does not follow, and beyond the last field.
+    Fields([Option<f64>; ROWS]),
 }
 
 impl NodeLink {
@@ -127,7 +127,7 @@ mod tests {
             Tie::Pose(UnitQuaternion::from_scaled_axis(Vector3::new(
                 0.2, 1.0, -0.4,
             ))),
-            Tie::Fields([Some(-1.0), None]),
+            Tie::Fields([Some(-1.0), None, None, None, None, None]),
         ];
         let h = 1e-6;
         for tie in ties {

@@ -44,17 +44,3 @@ impl Piece {
         }
     }
 }
-
-/// The rib slope beyond a bend of the board by χ, with two derivatives; `None` where the rib would leave through the
-/// bend: a rib there is one material line, α⁺ = α⁻ − χ.
-pub(crate) fn slope_beyond(slope: f64, angle: f64) -> Option<[f64; 3]> {
-    let (sine, cosine) = angle.sin_cos();
-    let denominator = cosine + slope * sine;
-    (denominator > 0.0).then(|| {
-        [
-            (slope * cosine - sine) / denominator,
-            denominator.powi(-2),
-            -2.0 * sine * denominator.powi(-3),
-        ]
-    })
-}

@@ -212,7 +212,7 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
             match link.tie {
                 Tie::Offset(_) => return None,
                 Tie::Pose(_) => (),
-                Tie::Fields([bend, slope]) => factor = bend.filter(|_| bend == slope),
+                Tie::Fields([bend, slope, ..]) => factor = bend.filter(|_| bend == slope),
             }
         }
         factor

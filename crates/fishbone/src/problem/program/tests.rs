@@ -1,5 +1,6 @@
 use super::*;
 use crate::strip::bounds::Edge;
+use crate::strip::density::slope_beyond;
 use crate::strip::element::Curl;
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, SymmetricEigen, Vector2};
 use stagewise::{Linearisation, Multipliers, Program, Stationary, Values, lowest_modes};
@@ -17,6 +18,7 @@ fn element(length: f64, geodesic: f64) -> Piece {
             bend: 0.8,
             poisson: 0.3,
         },
+        stretching: f64::INFINITY,
     })
 }
 
@@ -94,7 +96,8 @@ fn program() -> BeltProgram {
             square_rib: false,
         },
     ];
-    let mut program = BeltProgram::new(pieces, EnergyModel::Wunderlich).with_supports(supports);
+    let mut program =
+        BeltProgram::new(pieces, DevelopableEnergy::Wunderlich).with_supports(supports);
     let strips: Vec<usize> = program.elements().map(|(k, _)| k).collect();
     for k in strips {
         program.edges[k] = edges();
@@ -106,7 +109,7 @@ fn program() -> BeltProgram {
         },
         NodeLink {
             nodes: [1, 8],
-            tie: Tie::Fields([Some(-1.0), None]),
+            tie: Tie::Fields([Some(-1.0), None, None, None, None, None]),
         },
     ];
     program.loads = vec![NodeLoad {
@@ -354,13 +357,9 @@ fn test_lowest_modes_are_those_of_dense_matrices() {
 #[test]
 fn test_rib_at_a_bend_is_one_material_line() {
     for (slope, angle) in [(0.3f64, 0.5f64), (-0.2, -1.2), (1.5, 2.0)] {
-        let [beyond, first, _] = slope_beyond(slope, angle).unwrap();
+        let beyond = slope_beyond(slope, angle).unwrap();
         assert!((beyond.atan() - (slope.atan() - angle)).abs() < 1e-14);
-        assert!((slope_beyond(beyond, -angle).unwrap()[0] - slope).abs() < 1e-14);
-        let h = 1e-6;
-        let at = |by: f64| slope_beyond(slope + by, angle).unwrap();
-        assert!(((at(h)[0] - at(-h)[0]) / (2.0 * h) - first).abs() < 1e-6 * first);
-        assert!(((at(h)[1] - at(-h)[1]) / (2.0 * h) - at(0.0)[2]).abs() < 1e-5 * first.powi(2));
+        assert!((slope_beyond(beyond, -angle).unwrap() - slope).abs() < 1e-14);
     }
     assert_eq!(slope_beyond(0.0, 1.6), None);
 }

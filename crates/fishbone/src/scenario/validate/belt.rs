@@ -32,6 +32,9 @@ impl BeltSpec {
         if let Some(poisson) = self.poisson {
             check_poisson(format_args!("belt.poisson"), poisson)?;
         }
+        if let Some(thickness) = self.thickness {
+            positive(format_args!("belt.thickness"), thickness)?;
+        }
         finite(format_args!("belt.natural_bend"), self.natural_bend)?;
         not_negative(format_args!("belt.density"), self.density)?;
         self.check_half_turns()?;
@@ -155,6 +158,17 @@ impl BeltSpec {
         }
         self.check_layers()?;
         self.check_rigidity_sources()?;
+        let own = self.material.is_some() || self.layers.is_some();
+        require(
+            self.thickness.is_none() || !own,
+            format_args!("belt.thickness"),
+            || {
+                (
+                    "a thickness beside a material or layers",
+                    "left out, as they have their own",
+                )
+            },
+        )?;
         if self.material.is_some() {
             self.check_derived(format_args!("belt.material"))?;
         }

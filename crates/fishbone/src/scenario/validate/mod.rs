@@ -4,7 +4,7 @@ mod belt;
 mod check;
 mod outside;
 
-use super::{Method, Scenario, SolverSpec, SupportSpec};
+use super::{EnergyModel, Method, Scenario, SolverSpec, SupportSpec};
 use crate::scenario::error::{ScenarioError, number};
 use check::{Check, between, finite_vector, is_positive, require, span};
 use nalgebra::Vector3;
@@ -38,6 +38,7 @@ impl Scenario {
     /// Errors: the first thing wrong, with its field.
     pub fn validate(&self) -> Result<(), ScenarioError> {
         self.belt.check()?;
+        self.check_energy()?;
         let extent = self.extent();
         check_supports(&self.supports, extent)?;
         check_links(&self.links, extent)?;
@@ -48,6 +49,16 @@ impl Scenario {
             Method::Intrinsic => Ok(()),
             Method::Ritz => self.check_ritz(extent.length),
         }
+    }
+
+    fn check_energy(&self) -> Check {
+        let is_known = self.energy != EnergyModel::Shell || self.belt.stretching().is_some();
+        require(is_known, format_args!("energy"), || {
+            (
+                "\"shell\" of a belt without a thickness",
+                "another energy, or have belt.thickness, belt.material or belt.layers given",
+            )
+        })
     }
 
     /// Checks the replacement for a support of a valid scenario, at the same place along the belt.
@@ -86,6 +97,11 @@ impl Scenario {
     /// Checks the limits of the source's own method: straight belts with a connector at either end.
     fn check_ritz(&self, length: f64) -> Check {
         let refused = [
+            (
+                self.energy == EnergyModel::Shell,
+                "energy = \"shell\"",
+                "an energy of developable belts",
+            ),
             (
                 !self.belt.is_straight(),
                 "a belt that is not straight",

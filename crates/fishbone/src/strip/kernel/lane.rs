@@ -3,16 +3,42 @@
 use super::arithmetic::{
     cross, dot, entry, four, in_world, minus, plus, seen_from, three, triple, upper,
 };
-use super::{Input, Lanes, Output, Spans, Triple, Upper};
+use super::{Input, Lanes, Output, Spans, Surroundings, Triple, Upper};
 use crate::geometry::{SHORTENING, gauss_points};
-use crate::strip::developable::{EnergyModel, Term};
+use crate::strip::developable::{DevelopableEnergy, Term};
 
-/// The Magnus step of an element, with the parts of its derivatives: the fields at the Gauss points, the weights of the sum,
-/// of the commutator and of the chord's shortening.
+/// The Magnus step of an element with the derivatives of its rotation and translation by four fields at the Gauss points: the
+/// bend and one more at the first, then at the second.
+pub(in crate::strip) trait Step: Copy {
+    /// The step of a lane's element.
+    fn at(spans: &Spans, lane: usize) -> Self;
+
+    /// Rotation of the step.
+    fn rotation(&self) -> Triple;
+
+    /// Translation of the step.
+    fn translation(&self) -> Triple;
+
+    /// Derivatives of the rotation by the four fields.
+    fn rotation_by_gauss(&self) -> [Triple; 4];
+
+    /// Derivative of the translation by the bend at the second Gauss point; that by the bend at the first is the opposite,
+    /// and the other fields do not change it.
+    fn translation_by_rise(&self) -> Triple;
+
+    /// Second derivative along η of the translation by the bend at the second Gauss point.
+    fn translation_by_rise_twice(&self) -> f64;
+
+    /// Second derivatives of `by_rotation · rotation`.
+    fn second_derivatives(&self, by_rotation: Triple) -> Upper;
+}
+
+/// The Magnus step of a developable element, by bend and rib slope, with the parts of its derivatives: the fields at the
+/// Gauss points, the weights of the sum, of the commutator and of the chord's shortening.
 #[derive(Clone, Copy)]
 pub(super) struct Magnus {
-    pub(super) rotation: Triple,
-    pub(super) translation: Triple,
+    rotation: Triple,
+    translation: Triple,
     bend: [f64; 2],
     slope: [f64; 2],
     geodesic: f64,
@@ -21,9 +47,9 @@ pub(super) struct Magnus {
     shortening: f64,
 }
 
-impl Magnus {
+impl Step for Magnus {
     #[inline(always)]
-    pub(super) fn at(spans: &Spans, lane: usize) -> Self {
+    fn at(spans: &Spans, lane: usize) -> Self {
         let [less, more] = gauss_points();
         let [b0, s0, b1, s1] = [
             spans.fields[0][lane],
@@ -53,7 +79,16 @@ impl Magnus {
         }
     }
 
-    /// Derivatives of the rotation by (bend, slope) at the first Gauss point, then at the second.
+    #[inline(always)]
+    fn rotation(&self) -> Triple {
+        self.rotation
+    }
+
+    #[inline(always)]
+    fn translation(&self) -> Triple {
+        self.translation
+    }
+
     #[inline(always)]
     fn rotation_by_gauss(&self) -> [Triple; 4] {
         let ([b1, b2], [s1, s2]) = (self.bend, self.slope);
@@ -74,21 +109,17 @@ impl Magnus {
         ]
     }
 
-    /// Derivative of the translation by the bend at the second Gauss point; that by the bend at the first is the opposite,
-    /// and slopes do not change it.
     #[inline(always)]
     fn translation_by_rise(&self) -> Triple {
         let rise = self.bend[1] - self.bend[0];
         [self.weight, -2.0 * self.shortening * rise, 0.0]
     }
 
-    /// Second derivative along η of the translation by the bend at the second Gauss point.
     #[inline(always)]
     fn translation_by_rise_twice(&self) -> f64 {
         -2.0 * self.shortening
     }
 
-    /// Second derivatives of `by_rotation · rotation`.
     #[inline(always)]
     fn second_derivatives(&self, by_rotation: Triple) -> Upper {
         let ([b1, b2], [s1, s2]) = (self.bend, self.slope);
@@ -113,7 +144,7 @@ impl Magnus {
 }
 
 /// Weight √3/12 of the commutator in the Magnus step, per square of the step's length, dimensionless.
-const COMMUTATOR: f64 = 0.144_337_567_297_406_43;
+pub(in crate::strip) const COMMUTATOR: f64 = 0.144_337_567_297_406_43;
 
 /// Derivative of the rise of the bend, between the Gauss points, by (bend, slope) at the first, then at the second.
 const RISE_BY_GAUSS: [f64; 4] = [-1.0, 0.0, 1.0, 0.0];
@@ -121,7 +152,7 @@ const RISE_BY_GAUSS: [f64; 4] = [-1.0, 0.0, 1.0, 0.0];
 /// Derivatives of one lane, from the even functions of its rotation.
 #[inline(always)]
 pub(super) fn differentiate_lane(
-    model: EnergyModel,
+    model: DevelopableEnergy,
     input: &Input,
     cosine: Triple,
     cubic: Triple,
@@ -129,18 +160,12 @@ pub(super) fn differentiate_lane(
     output: &mut Output,
 ) {
     let step = Magnus::at(&input.spans, lane);
-    let frame = three(|i| triple(&input.frame, 3 * i, lane));
-    let position = triple(&input.position, 0, lane);
-    let next = triple(&input.next, 0, lane);
-    let force_in_world = triple(&input.wrench, 0, lane);
-    let moment_in_world = triple(&input.wrench, 3, lane);
-    // In the axes of the first node's frame; the moment is that about the second node.
-    let force = seen_from(&frame, force_in_world);
-    let moment = seen_from(&frame, minus(moment_in_world, cross(next, force_in_world)));
-    let motion = seen_from(&frame, minus(next, position));
-
-    let twists = Twists::of(&step, cosine, cubic);
-    let (gradient, work) = work(&step, &twists, cosine, cubic, force, moment);
+    let Motion {
+        twists,
+        gradient,
+        work,
+        place,
+    } = Motion::at(&step, &input.surroundings, cosine, cubic, lane);
     let rigidity = [input.rigidity[0][lane], input.rigidity[1][lane]];
     let energy = bending(model, &step, rigidity);
     let [factor, rise_0, rise_1] = triple(&input.across, 0, lane);
@@ -169,13 +194,6 @@ pub(super) fn differentiate_lane(
 
     let turns = triples_by_nodes(&twists.rotation);
     let shifts = triples_by_nodes(&twists.displacement);
-    let place = Place {
-        frame,
-        position,
-        motion,
-        force: force_in_world,
-        moment: moment_in_world,
-    };
     // Written out: the vectoriser would take a loop over the four columns for the loop over lanes.
     place.carry(
         turns[0],
@@ -207,8 +225,54 @@ pub(super) fn differentiate_lane(
     );
 }
 
+/// The motion along an element with its derivatives by the fields at the Gauss points.
+pub(in crate::strip) struct Motion {
+    pub(in crate::strip) twists: Twists,
+    /// Gradient of the work of all loads and supports beyond the element.
+    pub(in crate::strip) gradient: [f64; 4],
+    /// Second derivative of that work, upper triangle.
+    pub(in crate::strip) work: Upper,
+    pub(in crate::strip) place: Place,
+}
+
+impl Motion {
+    /// The motion along a lane's step, from the even functions of its rotation.
+    #[inline(always)]
+    pub(in crate::strip) fn at<S: Step>(
+        step: &S,
+        surroundings: &Surroundings,
+        cosine: Triple,
+        cubic: Triple,
+        lane: usize,
+    ) -> Self {
+        let frame = three(|i| triple(&surroundings.frame, 3 * i, lane));
+        let position = triple(&surroundings.position, 0, lane);
+        let next = triple(&surroundings.next, 0, lane);
+        let force_in_world = triple(&surroundings.wrench, 0, lane);
+        let moment_in_world = triple(&surroundings.wrench, 3, lane);
+        // In the axes of the first node's frame; the moment is that about the second node.
+        let force = seen_from(&frame, force_in_world);
+        let moment = seen_from(&frame, minus(moment_in_world, cross(next, force_in_world)));
+        let motion = seen_from(&frame, minus(next, position));
+        let twists = Twists::of(step, cosine, cubic);
+        let (gradient, work) = work(step, &twists, cosine, cubic, force, moment);
+        Self {
+            twists,
+            gradient,
+            work,
+            place: Place {
+                frame,
+                position,
+                motion,
+                force: force_in_world,
+                moment: moment_in_world,
+            },
+        }
+    }
+}
+
 /// The place of an element: its first node's frame and position, the motion along it, the wrench beyond it about the origin.
-struct Place {
+pub(in crate::strip) struct Place {
     frame: [Triple; 3],
     position: Triple,
     motion: Triple,
@@ -220,7 +284,7 @@ impl Place {
     /// The twist by one field, from its turn and shift seen from the first node, and half its bracket with any other in the
     /// wrench's work.
     #[inline(always)]
-    fn carry(
+    pub(in crate::strip) fn carry(
         &self,
         turn: Triple,
         shift: Triple,
@@ -243,10 +307,10 @@ impl Place {
 }
 
 /// Derivatives of the motion by the fields at the Gauss points: rotation from the left, and displacement.
-struct Twists {
+pub(in crate::strip) struct Twists {
     step: [Triple; 4],
-    rotation: [Triple; 4],
-    displacement: [Triple; 4],
+    pub(in crate::strip) rotation: [Triple; 4],
+    pub(in crate::strip) displacement: [Triple; 4],
     /// Along the step's rotation and translation.
     along: [f64; 4],
     along_translation: [f64; 4],
@@ -254,8 +318,8 @@ struct Twists {
 
 impl Twists {
     #[inline(always)]
-    fn of(step: &Magnus, cosine: Triple, cubic: Triple) -> Self {
-        let (phi, rho) = (step.rotation, step.translation);
+    fn of<S: Step>(step: &S, cosine: Triple, cubic: Triple) -> Self {
+        let (phi, rho) = (step.rotation(), step.translation());
         let plain = 1.0 - cubic[0] * dot(phi, phi);
         let once = cross(phi, rho);
         let twice = cross(phi, once);
@@ -294,15 +358,15 @@ impl Twists {
 /// Gradient of the work, and second derivative of `force` and `moment` on the twist of the motion, by the fields at the
 /// Gauss points (upper triangle).
 #[inline(always)]
-fn work(
-    step: &Magnus,
+fn work<S: Step>(
+    step: &S,
     twists: &Twists,
     cosine: Triple,
     cubic: Triple,
     force: Triple,
     moment: Triple,
 ) -> ([f64; 4], Upper) {
-    let (phi, rho) = (step.rotation, step.translation);
+    let (phi, rho) = (step.rotation(), step.translation());
     let square = dot(phi, phi);
     let (phi_force, phi_rho) = (dot(phi, force), dot(phi, rho));
     let force_rho = dot(force, rho);
@@ -385,7 +449,7 @@ struct Bending {
 }
 
 #[inline(always)]
-fn bending(model: EnergyModel, step: &Magnus, rigidity: [f64; 2]) -> Bending {
+fn bending(model: DevelopableEnergy, step: &Magnus, rigidity: [f64; 2]) -> Bending {
     let at = |i: usize| {
         let weight = step.half * rigidity[i];
         let Term {

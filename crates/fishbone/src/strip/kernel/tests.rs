@@ -105,11 +105,11 @@ fn work<D: DualNum<Primitive = f64> + Copy>(
 /// Bending energy by its definition, in any scalar.
 fn energy<D: DualNum<Primitive = f64> + Copy>(
     element: &Element,
-    model: EnergyModel,
+    model: DevelopableEnergy,
     w: [D; 4],
 ) -> D {
     let across = match model {
-        EnergyModel::Wunderlich => element.strips().across([w[1], w[3]]),
+        DevelopableEnergy::Wunderlich => element.strips().across([w[1], w[3]]),
         _ => Across::PLAIN.map(D::from),
     };
     let mut sum = D::from(0.0);
@@ -134,6 +134,7 @@ fn cases() -> Vec<(Element, Vector4<f64>)> {
                     bend: 2.0 * geodesic,
                     poisson: 0.34,
                 },
+                stretching: f64::INFINITY,
             };
             cases.push((
                 element,
@@ -158,10 +159,10 @@ fn assert_close<const R: usize, const C: usize>(
 }
 
 /// Energy models, one of each.
-const MODELS: [EnergyModel; 3] = [
-    EnergyModel::Fishbone,
-    EnergyModel::Sadowsky,
-    EnergyModel::Wunderlich,
+const MODELS: [DevelopableEnergy; 3] = [
+    DevelopableEnergy::Fishbone,
+    DevelopableEnergy::Sadowsky,
+    DevelopableEnergy::Wunderlich,
 ];
 
 #[test]
@@ -173,7 +174,7 @@ fn test_increment_agrees_with_the_exponential_series() {
         let mut motions = Motions::default();
         let [a, b] = ends(&w);
         motions.set(3, &element, [&a, &b]);
-        motions.find(&EnergyModel::Wunderlich);
+        motions.find(&DevelopableEnergy::Wunderlich);
         for motion in [motion, motions.at(3)] {
             assert_close(motion.position, Vector3::from(p), 1e-14);
             assert_close(motion.frame, Matrix3::from_fn(|i, j| e[i][j]), 1e-14);
@@ -220,7 +221,7 @@ fn check_lane(
     lane: usize,
     element: &Element,
     w: &Vector4<f64>,
-    model: EnergyModel,
+    model: DevelopableEnergy,
     first: &Pose,
     wrench: &NodeVector,
 ) {

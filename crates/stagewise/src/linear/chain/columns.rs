@@ -53,3 +53,43 @@ pub(super) fn weighted<const U: usize>(a: impl Fn(usize) -> f64, b: impl Fn(usiz
     }
     sum
 }
+
+/// The growth of the states by the controls, as scalar products with it need it: where there are more controls than two, by
+/// rows too, so that the products with all columns are found at once.
+pub(super) struct GrowthRows<'a, const U: usize, const N: usize> {
+    columns: &'a [[f64; N]; U],
+    rows: [[f64; U]; N],
+}
+
+impl<'a, const U: usize, const N: usize> GrowthRows<'a, U, N> {
+    const BY_ROWS: bool = U > 2;
+
+    #[inline(always)]
+    pub(super) fn of(columns: &'a [[f64; N]; U]) -> Self {
+        let mut rows = [[0.0; U]; N];
+        if Self::BY_ROWS {
+            for row in 0..N - U {
+                for j in 0..U {
+                    rows[row][j] = columns[j][row];
+                }
+            }
+        }
+        Self { columns, rows }
+    }
+
+    /// Scalar products of a state with at least the first `count` columns of the growth.
+    #[inline(always)]
+    pub(super) fn products(&self, state: &[f64; N], count: usize) -> [f64; U] {
+        let mut products = [0.0; U];
+        if Self::BY_ROWS {
+            for row in 0..N - U {
+                add_scaled(&mut products, state[row], &self.rows[row]);
+            }
+        } else {
+            for i in 0..count {
+                products[i] = dot_states::<U, N>(&self.columns[i], state);
+            }
+        }
+        products
+    }
+}

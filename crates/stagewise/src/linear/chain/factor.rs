@@ -1,12 +1,12 @@
 //! Elimination of a chain's controls, stage by stage from the last to the first.
 
-use super::columns::{Columns, add_scaled, carried, dot_states, weighted};
+use super::columns::{Columns, GrowthRows, add_scaled, carried, weighted};
 use super::{Chain, Diagonal, NodeMatrix, NodeVector, Stage};
 use crate::linear::TooConcave;
 use crate::linear::pair_matrix::StageMatrix;
 use crate::linear::small::{invert, invert_indefinite};
 use multiversion::multiversion;
-use nalgebra::{ArrayStorage, Cholesky, Const};
+use nalgebra::{ArrayStorage, Cholesky, Const, SMatrix};
 
 /// Elimination of one stage's second controls: the controls are −`gain`ᵀ times the first node's unknowns, less `inverse`
 /// times the force on the controls.
@@ -65,22 +65,43 @@ impl<const N: usize> First<N> {
     }
 }
 
+/// What is added to the second derivative by the unknowns: the strength to the first state, and the strength times both weights
+/// to every control.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Damping<'a, const U: usize> {
+    /// Second derivative per unit weight.
+    pub(crate) strength: f64,
+    /// Weights of the nodes.
+    pub(crate) nodes: &'a [f64],
+    /// Weights of a node's controls.
+    pub(crate) controls: [f64; U],
+}
+
+impl<'a, const U: usize> Damping<'a, U> {
+    /// No damping of nodes, which have these weights.
+    pub(crate) fn none(nodes: &'a [f64]) -> Self {
+        Self {
+            strength: 0.0,
+            nodes,
+            controls: [1.0; U],
+        }
+    }
+}
+
 impl<const U: usize, const N: usize> Chain<U, N> {
-    /// Factorises the chain with `damping` added to the second derivative by the unknowns: the first state, and every
-    /// control times the node's weight. Gives the number of concave directions, of `most` that are allowed.
+    /// Factorises the chain with damping. Gives the number of concave directions, of `most` that are allowed.
     ///
     /// Errors: [`TooConcave`] where more directions are concave, or a direction has zero curvature.
     pub(crate) fn factorise<const X: usize>(
         &self,
         diagonal: &Diagonal<X, U, N>,
-        damping: f64,
-        weights: &[f64],
+        damping: &Damping<'_, U>,
         most: usize,
         into: &mut Factor<U, N>,
     ) -> Result<usize, TooConcave> {
-        let (mut first, concave) = eliminate_all(self, diagonal, damping, weights, most, into)?;
+        let (mut first, concave) = eliminate_all(self, diagonal, damping, most, into)?;
         for i in 0..X {
-            first[(i, i)] += damping;
+            first[(i, i)] += damping.strength;
         }
         for (i, free) in self.first_free.iter().enumerate() {
             if !free {
@@ -99,17 +120,16 @@ impl<const U: usize, const N: usize> Chain<U, N> {
 fn eliminate_all<const X: usize, const U: usize, const N: usize>(
     chain: &Chain<U, N>,
     diagonal: &Diagonal<X, U, N>,
-    damping: f64,
-    weights: &[f64],
+    damping: &Damping<'_, U>,
     most: usize,
     into: &mut Factor<U, N>,
 ) -> Result<(NodeMatrix<N>, usize), TooConcave> {
     let mut terms = diagonal.nodes.iter().rev().peekable();
     let mut cost: Columns<N> = [[0.0; N]; N];
     let mut concave = 0;
-    for k in (0..weights.len()).rev() {
-        for i in X..N {
-            cost[i][i] += damping * weights[k];
+    for k in (0..damping.nodes.len()).rev() {
+        for i in 0..U {
+            cost[X + i][X + i] += damping.strength * damping.nodes[k] * damping.controls[i];
         }
         if let Some(state) = diagonal.states.get(k) {
             for (column, own) in cost.iter_mut().zip(&state.data.0) {
@@ -155,17 +175,19 @@ fn eliminate<const U: usize, const N: usize>(
         toward[j] = carried(cost[states + j], &second[j], cost, states);
         before[j] = carried([0.0; N], &first[j], cost, states);
     }
+    let [first, second] = [GrowthRows::of(first), GrowthRows::of(second)];
     let mut pivot = [[0.0; U]; U];
     for j in 0..U {
+        let grown = second.products(&toward[j], j + 1);
         for i in 0..=j {
-            let own = toward[j][states + i] + dot_states::<U, N>(&second[i], &toward[j]);
+            let own = toward[j][states + i] + grown[i];
             pivot[i][j] = own + controls.second.data.0[j][i];
             pivot[j][i] = pivot[i][j];
         }
     }
     for j in 0..U {
-        let own: [f64; U] = std::array::from_fn(|i| dot_states::<U, N>(&first[i], &before[j]));
-        let next: [f64; U] = std::array::from_fn(|i| dot_states::<U, N>(&first[i], &toward[j]));
+        let own = first.products(&before[j], U);
+        let next = first.products(&toward[j], U);
         add_scaled(&mut before[j], 1.0, &state_first[j]);
         add_scaled(&mut toward[j], 1.0, &state_second[j]);
         for i in 0..U {
@@ -173,8 +195,8 @@ fn eliminate<const U: usize, const N: usize>(
             toward[j][states + i] = controls.mixed.data.0[j][i] + next[i];
         }
     }
-    if stage.tie != [0.0; U] {
-        follow(stage, &pivot, &mut toward, &mut before);
+    if let Some(tie) = &stage.tie {
+        follow(tie, &pivot, &mut toward, &mut before);
     }
     for row in 0..states {
         for j in 0..U {
@@ -207,24 +229,29 @@ fn eliminate<const U: usize, const N: usize>(
     Ok(concave)
 }
 
-/// Adds the cost of tied second controls to the cost of the first controls.
+/// Turns the derivatives by the second controls into those by their free part, and adds the cost of the part that follows the
+/// first controls to the cost of these.
 fn follow<const U: usize, const N: usize>(
-    stage: &Stage<U, N>,
+    tie: &SMatrix<f64, U, U>,
     pivot: &[[f64; U]; U],
     toward: &mut [[f64; N]; U],
     before: &mut [[f64; N]; U],
 ) {
     let states = N - U;
-    let tie = stage.tie;
     for j in 0..U {
-        add_scaled(&mut before[j], tie[j], &toward[j]);
         for i in 0..U {
-            before[j][states + i] += tie[i] * (toward[i][states + j] + pivot[i][j] * tie[j]);
+            before[j][states + i] += weighted::<U>(|l| tie[(l, i)], |l| toward[l][states + j]);
         }
     }
     for j in 0..U {
         for i in 0..U {
-            toward[j][states + i] += tie[i] * pivot[i][j];
+            toward[j][states + i] += weighted::<U>(|l| tie[(l, i)], |l| pivot[l][j]);
+        }
+    }
+    // The derivatives as they are now: what follows acts on itself, too.
+    for j in 0..U {
+        for l in 0..U {
+            add_scaled(&mut before[j], tie[(l, j)], &toward[l]);
         }
     }
 }

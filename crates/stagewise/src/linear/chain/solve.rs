@@ -42,11 +42,17 @@ fn gather<const U: usize, const N: usize>(
             &stage.growth_by_second.data.0,
         ];
         let mut before = own.data.0[0];
+        let mut by_first = [0.0; U];
+        let mut by_second = [0.0; U];
+        for j in 0..U {
+            by_first[j] = dot_states::<U, N>(&first[j], &cost);
+            by_second[j] = cost[states + j] + dot_states::<U, N>(&second[j], &cost);
+        }
+        stage.fold(&by_second, &mut by_first);
         let mut toward = [0.0; U];
         for j in 0..U {
-            let by_second = cost[states + j] + dot_states::<U, N>(&second[j], &cost);
-            before[states + j] += dot_states::<U, N>(&first[j], &cost) + stage.tie[j] * by_second;
-            toward[j] = if stage.free[j] { by_second } else { 0.0 };
+            before[states + j] += by_first[j];
+            toward[j] = if stage.free[j] { by_second[j] } else { 0.0 };
         }
         for row in 0..states {
             before[row] += cost[row];
@@ -74,12 +80,12 @@ fn spread<const U: usize, const N: usize>(
     let stages = chain.stages.iter().zip(&factor.eliminations);
     let next = factor.forces.iter().zip(&mut step[1..]);
     for ((stage, e), (force, next)) in stages.zip(next) {
-        let mut second = [0.0; U];
+        let mut second = force.map(|force| -force);
+        stage.add_following(&node[states..], &mut second);
         for j in 0..U {
             let gain = &e.gain[j];
             let by_controls = weighted::<U>(|i| gain[states + i], |i| node[states + i]);
-            let own = dot_states::<U, N>(gain, &node) + by_controls;
-            second[j] = stage.tie[j] * node[states + j] - force[j] - own;
+            second[j] -= dot_states::<U, N>(gain, &node) + by_controls;
         }
         node = stage.carry(&node, second);
         next.data.0[0] = node;

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::linear::modes::Mode;
-use nalgebra::{DMatrix, DVector, SVector, SymmetricEigen};
+use nalgebra::{DMatrix, DVector, SMatrix, SVector, SymmetricEigen};
 use proptest::prelude::*;
 
 const STAGES: usize = 4;
@@ -65,6 +65,8 @@ fn fill(linear: &mut Linear, stiff: f64, numbers: &mut impl Iterator<Item = f64>
     for [first, second] in &mut linear.stage_slacks {
         (*first, *second) = (SVector::repeat(next()), SVector::repeat(next()));
     }
+    // A joint whose second control follows the first, and has a free part besides.
+    linear.chain.stages[1].tie = Some(SMatrix::from([[next()]]));
 }
 
 /// The system by the unknowns: the first state and all controls, then the rows of the equalities.
