@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-ENERGIES = get_args(EnergyModel)
+ENERGIES = tuple(energy for energy in get_args(EnergyModel) if energy != "shell")
+"""Energies of developable belts."""
 EXAMPLES = ("example1", "example2")
 SHELLS = ROOT / "tests" / "data" / "shell"
 SHAPES = ROOT / "docs" / "shapes.toml"

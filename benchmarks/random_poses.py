@@ -9,15 +9,14 @@ uniform in 0–70°, V = 0.1 U, the three energies in turn. No pose is discarded
 from __future__ import annotations
 
 import argparse
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
 import fishbone as fb
 import tables
-from fishbone.names import EnergyModel
+from cases import ENERGIES
 
-ENERGIES = get_args(EnergyModel)
 TOLERANCE = 1e-8
 
 

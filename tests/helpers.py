@@ -26,9 +26,10 @@ import fishbone as fb
 Array = npt.NDArray[np.float64]
 Nodes = npt.NDArray[np.intp]
 Json = dict[str, Any]
-Energy = Literal["fishbone", "sadowsky", "wunderlich"]
+Energy = Literal["fishbone", "sadowsky", "wunderlich", "shell"]
 
 ENERGIES: tuple[Energy, ...] = ("fishbone", "sadowsky", "wunderlich")
+"""Energies of developable belts."""
 SHELL_DATA = Path(__file__).parent / "data" / "shell"
 
 ORIGIN = (0.0, 0.0, 0.0)

@@ -58,7 +58,7 @@ def test_every_word_that_is_drawn_or_printed_is_a_word_of_the_core():
 
 
 def test_the_tests_know_the_same_energies():
-    assert NAMES["EnergyModel"] == helpers.ENERGIES
+    assert NAMES["EnergyModel"] == (*helpers.ENERGIES, "shell")
 
 
 def test_the_core_knows_no_other_motions(arch):

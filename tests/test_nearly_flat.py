@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from scipy.integrate import quad
 
 import fishbone as fb
 from fishbone.names import EnergyModel
-from helpers import clamped
+from helpers import ENERGIES, clamped
 
 RADIUS = 2.0 / math.pi
 START = {"at": "start", "position": [0.0, 0.0, 0.0], "rotation": [0.0, 0.0, 0.0]}
@@ -144,7 +144,7 @@ def test_path_leads_an_arc_off_the_plane() -> None:
     assert branch.energy[2] == pytest.approx(near.energy, rel=2e-3)
 
 
-@pytest.mark.parametrize("energy", get_args(EnergyModel))
+@pytest.mark.parametrize("energy", ENERGIES)
 @pytest.mark.parametrize(
     ("curvature", "width"), [(2.0, 0.3), (2.0, 0.2), (4.0, 0.05), (4.0, 0.1), (6.0, 0.03), (6.0, 0.1), (2.0, 0.5)]
 )

@@ -54,23 +54,35 @@ def kernels():
     return [counts for counts in found.values() if not counts["fused"]]
 
 
+def scalar_share(counts):
+    """Share of the numbers that instructions on single numbers work on."""
+    numbers = {registers: width * counts[registers] for registers, width in WIDTHS.items()}
+    return numbers["scalar"] / sum(numbers.values())
+
+
 @pytest.mark.parametrize(("registers", "more_than"), [("zmm", 150), ("ymm", 300)])
 def test_kernels_of_elements_take_all_lanes_at_a_time(kernels, registers, more_than):
-    # The motions and, for the source's energy and for the plate's, the derivatives; no other kernel has so much to do.
-    of_elements = [counts for counts in kernels if counts[registers] > more_than]
-    assert len(of_elements) == 3, kernels
-    # A loop that takes the lanes one by one is a few instructions here, and as many again for every lane when it runs.
-    assert all(set(counts) == {registers} for counts in of_elements), of_elements
+    # The motions of developable strips and of thick ones, and for the source's energy and for the plate's, the
+    # derivatives. A loop that takes the lanes one by one is a few instructions here, and as many again for every lane
+    # when it runs: a kernel with such a loop is none of these.
+    of_elements = [counts for counts in kernels if set(counts) == {registers} and counts[registers] > more_than]
+    assert len(of_elements) == 4, kernels
+
+
+@pytest.mark.parametrize("registers", ["zmm", "ymm"])
+def test_derivatives_of_thick_strips_take_most_lanes_at_a_time(kernels, registers):
+    # On straight boards and on curved ones. The functions of the edge layers and a part of the work along the chain
+    # take the lanes one by one.
+    thick = [counts for counts in kernels if counts[registers] > 1000 and counts["scalar"]]
+    assert len(thick) == 2, kernels
+    assert all(scalar_share(counts) < 0.06 for counts in thick), thick
 
 
 def test_kernels_of_stages_work_on_several_numbers_at_a_time(kernels):
-    odd = 0
-    for counts in kernels:
-        numbers = {registers: width * counts[registers] for registers, width in WIDTHS.items()}
-        # Of the elimination of belts 0.07 is scalar: pivots are divided by one after the other. Of that of the
-        # programme that proves flat parts stable it is 0.18, and 0.22 of a step there: its odd size leaves a remainder.
-        share = numbers["scalar"] / sum(numbers.values())
-        assert share < 0.25, counts
-        odd += share >= 0.15
-    # The elimination and the step of that programme; a third such kernel has lost its lanes.
-    assert odd == 2, kernels
+    # Of the elimination of belts 0.07 is scalar: pivots are divided by one after the other. Of that of the programme
+    # that proves flat parts stable it is 0.16, and 0.25 and 0.27 of the steps there: its odd size leaves a remainder,
+    # and ties of controls, at joints alone, are products of small matrices.
+    shares = [scalar_share(counts) for counts in kernels]
+    assert max(shares) < 0.28, kernels
+    # A fourth such kernel has lost its lanes.
+    assert sum(share >= 0.15 for share in shares) == 3, kernels

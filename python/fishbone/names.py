@@ -9,7 +9,7 @@ from typing import Literal, TypeAlias
 
 Status: TypeAlias = Literal["converged", "infeasible", "not_converged"]
 """How a solve ended."""
-EnergyModel: TypeAlias = Literal["fishbone", "sadowsky", "wunderlich"]
+EnergyModel: TypeAlias = Literal["fishbone", "sadowsky", "wunderlich", "shell"]
 """The energy minimised."""
 Method: TypeAlias = Literal["intrinsic", "ritz"]
 """The method of solution."""
