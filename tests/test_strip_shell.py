@@ -240,3 +240,12 @@ def test_what_knows_developable_belts_only_says_so() -> None:
     with pytest.raises(fb.NoTracker, match="wunderlich") as tracker:
         fb.Tracker(belt.scenario)
     assert (sensitivity.value.reason, tracker.value.reason) == ("shell", "shell")
+
+
+def test_coarse_mesh_is_warned_of() -> None:
+    """A fixed mesh of elements longer than V/8, and one whose error is above the accuracy."""
+    long = solve(thick(example1(elements=40)))
+    assert any(warning.startswith("elements of 0.25 V may settle") for warning in long.warnings)
+    belt = thick(example1(elements=80))
+    fine = solve({**belt, "solver": {**belt["solver"], "accuracy": 1e-6}})
+    assert any("is above solver.accuracy, 1e-6" in warning for warning in fine.warnings)

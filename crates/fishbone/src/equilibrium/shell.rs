@@ -50,8 +50,8 @@ pub(crate) fn as_developable(problem: &Problem) -> Problem {
     problem.with_energy(EnergyModel::Wunderlich)
 }
 
-/// The minimum of a strip of finite thickness next to an equilibrium of the developable one, on meshes that follow the error; the
-/// result for the developable one where that has no shape.
+/// The minimum of a strip of finite thickness next to an equilibrium of the developable one, on meshes that follow the
+/// error; the result for the developable one where no shape meets the supports.
 pub(crate) fn next_to(problem: &Problem, found: Equilibrium, proceed: &mut Proceed) -> Equilibrium {
     let (Some(start), false) = (found.developable(), found.status == Status::Infeasible) else {
         return Equilibrium {
@@ -86,12 +86,12 @@ pub(crate) fn next_to(problem: &Problem, found: Equilibrium, proceed: &mut Proce
         let known = change(problem, (&program, &solution), (&finer, &better));
         let is_accurate = known.of_the_whole() <= problem.accuracy()
             && !hides_energy(problem, &program, &solution);
-        error = OnceLock::from(Some(known));
+        error = OnceLock::from(Some(known).filter(MeshError::is_finite));
         if is_accurate {
             break;
         }
         // The finer solution's own error is about half of the change.
-        error = OnceLock::from(Some(known.times(0.5)));
+        error = OnceLock::from(Some(known.times(0.5)).filter(MeshError::is_finite));
         (program, solution) = (finer, better);
     }
     let redundant = intrinsic::redundant(problem, &bare);
@@ -265,7 +265,7 @@ fn hides_energy(problem: &Problem, program: &ShellProgram, solution: &ShellSolut
     /// Parts of an element along the belt, and points across it, a number.
     const FINER: [usize; 2] = [4, 8];
     let Some(mut finer) = split(problem, program, FINER[0]) else {
-        return false;
+        return true;
     };
     finer.model = finer.model.with_points(FINER[1]);
     let point = prolonged(program, &solution.at.point, &finer);
@@ -273,7 +273,10 @@ fn hides_energy(problem: &Problem, program: &ShellProgram, solution: &ShellSolut
         program.elastic_energy(&solution.at.point.fields),
         finer.elastic_energy(&point.fields),
     ];
-    (own - true_one).abs() > CHANGE * own.abs().max(program.size(&solution.at.point))
+    // A change that is no number is no small one.
+    let is_small =
+        (own - true_one).abs() <= CHANGE * own.abs().max(program.size(&solution.at.point));
+    !is_small
 }
 
 /// Stability of a solution by its second variation, on all motions that its scenario leaves.

@@ -402,8 +402,8 @@ impl Density<FIELDS> for Shell {
         2 * Share::PLACES.len()
     }
 
-    /// At both ends and wherever the energy is taken the ribs of an element keep a tenth of the way to where they meet at an edge: on coarse
-    /// meshes they come closer beside clamps and inflections without need.
+    /// At both ends and wherever the energy is taken the ribs of an element keep a tenth of the way to where they meet at
+    /// an edge: on coarse meshes they come closer beside clamps and inflections without need.
     fn slacks(
         &self,
         element: &Element,
