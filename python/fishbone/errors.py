@@ -53,13 +53,12 @@ class NoSupport(FishboneError, LookupError):  # noqa: N818
 class NoSensitivity(FishboneError):  # noqa: N818
     """A shape has no derivatives: it is no equilibrium, no minimum, or not determined by its supports."""
 
-    reason: (
-        Literal["no_multipliers", "not_converged", "shell", "marginal", "flat", "saddle", "redundant", "no_slack"]
-        | None
-    ) = None
-    """The reason: the source's method has no multipliers; the solve has not converged; the energy is "shell"; the
-    belt moves at no cost of energy; a part of the belt is flat under load; the equilibrium is a saddle; supports and
-    links are redundant constraints; or the supports leave no slack."""
+    reason: Literal["no_multipliers", "not_converged", "marginal", "flat", "saddle", "redundant", "no_slack"] | None = (
+        None
+    )
+    """The reason: the source's method has no multipliers; the solve has not converged; the belt moves at no cost of
+    energy; a part of the belt is flat under load; the equilibrium is a saddle; supports and links are redundant
+    constraints; or the supports leave no slack."""
     redundant: str | None = None
     """The supports and links that are redundant constraints."""
     solve_message: str | None = None
@@ -73,7 +72,6 @@ class NoMargin(FishboneError):  # noqa: N818
         Literal[
             "no_multipliers",
             "not_converged",
-            "shell",
             "no_slack",
             "flat",
             "singular",
@@ -101,9 +99,9 @@ class NoMargin(FishboneError):  # noqa: N818
 class NoModes(FishboneError):  # noqa: N818
     """A shape has no modes, because it is no equilibrium."""
 
-    reason: Literal["no_multipliers", "not_converged", "shell", "singular"] | None = None
+    reason: Literal["no_multipliers", "not_converged", "singular"] | None = None
     """The reason: the source's method has no multipliers; the solve has not converged; or the second variation is
-    singular. Modes of `energy = "shell"` are found: the reason "shell" is not used here."""
+    singular."""
     solve_message: str | None = None
     """The message of the solve that has not converged."""
 
@@ -111,9 +109,9 @@ class NoModes(FishboneError):  # noqa: N818
 class NoTracker(FishboneError):  # noqa: N818
     """There is no equilibrium to track, or its support cannot be moved."""
 
-    reason: Literal["no_multipliers", "not_converged", "shell", "not_clamped", "no_support", "marginal"] | None = None
-    """The reason: the source's method has no multipliers; the solve has not converged; the energy is "shell"; the
-    support does not hold a whole pose; there is no such support; or the equilibrium is no strict minimum."""
+    reason: Literal["no_multipliers", "not_converged", "not_clamped", "no_support", "marginal"] | None = None
+    """The reason: the source's method has no multipliers; the solve has not converged; the support does not
+    hold a whole pose; there is no such support; or the equilibrium is no strict minimum."""
     support: int | None = None
     """Index of the support that does not hold a whole pose, or does not exist."""
     solve_message: str | None = None
@@ -140,10 +138,10 @@ class NoPath(FishboneError, ValueError):  # noqa: N818
 class NoBranch(FishboneError):  # noqa: N818
     """There is no equilibrium to follow, or more than one branch continues it."""
 
-    reason: Literal["no_multipliers", "not_converged", "shell", "no_slack", "flat", "singular"] | None = None
-    """The reason: the source's method has no multipliers; the solve has not converged; the energy is "shell"; the
-    supports leave no slack; the belt is flat and may leave its plane in many ways; or the equilibrium is singular, so
-    that no single branch continues it."""
+    reason: Literal["no_multipliers", "not_converged", "no_slack", "flat", "singular"] | None = None
+    """The reason: the source's method has no multipliers; the solve has not converged; the supports leave no
+    slack; the belt is flat and may leave its plane in many ways; or the equilibrium is singular, so that no single
+    branch continues it."""
     solve_message: str | None = None
     """The message of the solve that has not converged."""
 

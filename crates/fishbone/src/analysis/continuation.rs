@@ -7,12 +7,14 @@ mod trace;
 
 use crate::analysis::family::{Along, Station};
 use crate::analysis::path::Path;
-use crate::equilibrium::guess::is_flat;
-use crate::equilibrium::{Equilibrium, Stability, Status, Uncertified, of_solution};
+use crate::equilibrium::model::{AnyStationary, StripModel};
+use crate::equilibrium::{AnySolved, Equilibrium, Solved, Stability, Status, Uncertified};
 use crate::geometry::Wrench;
 use crate::names::named;
 use crate::problem::program::BeltPoint;
 use crate::problem::{Mesh, Problem};
+use crate::strip::developable::DevelopableEnergy;
+use crate::strip::shell::{FIELDS, Shell};
 use crate::surface;
 use nalgebra::Vector3;
 use stagewise::{Events, Pace, Residuals, Stationary};
@@ -195,7 +197,7 @@ pub struct State {
     pub negative_modes: usize,
     /// Largest residuals of the state's discrete equations.
     pub residuals: Residuals,
-    at: Stationary<BeltPoint>,
+    at: AnyStationary,
     mesh: Arc<Mesh>,
 }
 
@@ -288,17 +290,29 @@ pub fn follow(
     settings: &Settings,
     proceed: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
 ) -> Result<Diagram, NoBranch> {
-    equilibrium.certified()?;
+    equilibrium.certified_any()?;
     if path.base().has_no_slack() {
         return Err(NoBranch::NoSlack);
     }
     let suited = equilibrium.for_paths(&mut || proceed(0, 0.0));
     let equilibrium = suited.as_ref().unwrap_or(equilibrium);
-    let solved = equilibrium.certified()?;
-    let family = Along {
-        path: path.clone(),
-        mesh: Mesh::of(path.base(), &solved.program),
-    };
+    match equilibrium.certified_any()? {
+        AnySolved::Developable(solved) => {
+            follow_solved(equilibrium, solved, path, settings, proceed)
+        }
+        AnySolved::Shell(solved) => follow_solved(equilibrium, solved, path, settings, proceed),
+    }
+}
+
+/// As [`follow`], of an equilibrium given with its solved programme.
+fn follow_solved<D: StripModel<F, N>, const F: usize, const N: usize>(
+    equilibrium: &Equilibrium,
+    solved: &Solved<D, F, N>,
+    path: &Path,
+    settings: &Settings,
+    proceed: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
+) -> Result<Diagram, NoBranch> {
+    let family = Along::<D, F, N>::new(path.clone(), Mesh::of(path.base(), &solved.program));
     let pace = Pace {
         longest: settings.step,
         stations: settings.states,
@@ -313,8 +327,7 @@ pub fn follow(
             (family, start)
         }
     };
-    let is_flat = |point: &BeltPoint| point.fields.iter().all(is_flat);
-    let start = start.ok_or_else(|| match is_flat(&solved.at.point) {
+    let start = start.ok_or_else(|| match solved.at.point.is_flat() {
         true => NoBranch::Flat,
         false => NoBranch::Singular,
     })?;
@@ -328,7 +341,7 @@ pub fn follow(
     if is_off_flat {
         flat::begin_at(first, equilibrium, solved);
     }
-    flat::end_flat(&mut diagram, proceed);
+    flat::end_flat::<D, F, N>(&mut diagram, proceed);
     Ok(diagram)
 }
 
@@ -358,15 +371,29 @@ impl Summary {
 }
 
 impl State {
-    fn of(station: &Station, mesh: Arc<Mesh>) -> Self {
+    fn of<D: StripModel<F, N>, const F: usize, const N: usize>(
+        station: &Station<F, N>,
+        mesh: Arc<Mesh>,
+    ) -> Self {
         Self {
             mesh,
             place: station.parameter,
             negative_modes: station.negative,
             residuals: station.residuals,
-            at: station.at.clone(),
+            at: D::any_stationary(station.at.clone()),
         }
     }
+}
+
+/// The equilibrium at a stationary point of a problem's programme on a mesh.
+fn equilibrium_at<D: StripModel<F, N>, const F: usize, const N: usize>(
+    problem: &Problem,
+    mesh: &Mesh,
+    at: &Stationary<BeltPoint<F>>,
+) -> Equilibrium {
+    let program = D::program_on(problem, mesh).expect("it was solved there");
+    let solution = stagewise::assess(&program, problem.tolerance(), at);
+    D::of_solution(problem, program, solution)
 }
 
 impl Diagram {
@@ -389,10 +416,14 @@ impl Diagram {
     pub fn equilibrium(&self, branch: usize, state: usize) -> Equilibrium {
         let problem = self.problem(branch, state);
         let state = &self.branches[branch].states[state];
-        let program = problem.program_on(&state.mesh);
-        let program = program.expect("it was solved there");
-        let solution = stagewise::assess(&program, problem.tolerance(), &state.at);
-        of_solution(&problem, program, solution)
+        match &state.at {
+            AnyStationary::Developable(at) => {
+                equilibrium_at::<DevelopableEnergy, 2, 8>(&problem, &state.mesh, at)
+            }
+            AnyStationary::Shell(at) => {
+                equilibrium_at::<Shell, FIELDS, 12>(&problem, &state.mesh, at)
+            }
+        }
     }
 
     /// The summary of a state for a report on the path.

@@ -2,50 +2,58 @@
 
 use crate::analysis::path::Path;
 use crate::analysis::sensitivity::add_support_motion;
-use crate::equilibrium::{
-    carries, mesh_that_carries, minimum_next_to_on, prolonged, prolonged_with_multipliers,
-};
+use crate::equilibrium::Solved;
+use crate::equilibrium::model::StripModel;
 use crate::problem::program::{BeltPoint, BeltProgram, rows_of};
 use crate::problem::{Mesh, Problem};
+use crate::strip::developable::DevelopableEnergy;
 use stagewise::{Continuation, Direction, Family, Pace, Program, Stationary, by_differences};
+use std::marker::PhantomData;
 use std::ops::ControlFlow;
 
 /// A station of a branch.
-pub(super) type Station = stagewise::Station<BeltPoint, 8>;
+pub(super) type Station<const F: usize = 2, const N: usize = 8> =
+    stagewise::Station<BeltPoint<F>, N>;
 
 /// The programmes of the problems along a path, all on the same mesh.
 #[derive(Debug, Clone)]
-pub(super) struct Along {
+pub(super) struct Along<D = DevelopableEnergy, const F: usize = 2, const N: usize = 8> {
     pub(super) path: Path,
     pub(super) mesh: Mesh,
+    model: PhantomData<D>,
 }
 
-impl Along {
+impl<D: StripModel<F, N>, const F: usize, const N: usize> Along<D, F, N> {
+    /// The programmes of a path on a mesh.
+    pub(super) fn new(path: Path, mesh: Mesh) -> Self {
+        Self {
+            path,
+            mesh,
+            model: PhantomData,
+        }
+    }
+
     /// The problem at a place, with its programme.
-    pub(super) fn meshed(&self, place: f64) -> Option<(Problem, BeltProgram)> {
+    pub(super) fn meshed(&self, place: f64) -> Option<(Problem, BeltProgram<D, F, N>)> {
         let problem = self.path.at(place)?;
-        let program = problem.program_on(&self.mesh)?;
+        let program = D::program_on(&problem, &self.mesh)?;
         Some((problem, program))
     }
 
     /// The same path on another mesh.
     pub(super) fn on(&self, mesh: Mesh) -> Self {
-        Self {
-            path: self.path.clone(),
-            mesh,
-        }
+        Self::new(self.path.clone(), mesh)
     }
 
     /// The programmes along the leg of the path on which a station lies, and the places of the ends of this leg; where two
     /// legs meet, it is the leg ahead.
-    pub(super) fn leg(&self, station: &Station) -> (Self, [f64; 2]) {
+    pub(super) fn leg(&self, station: &Station<F, N>) -> (Self, [f64; 2]) {
         let (path, ends) = self.path.leg(station.parameter, station.is_rising());
-        let mesh = self.mesh.clone();
-        (Self { path, mesh }, ends)
+        (Self::new(path, self.mesh.clone()), ends)
     }
 
     /// A continuation over the whole path.
-    pub(super) fn continuation(&self, pace: Pace) -> Continuation<'_, Self, 6, 2, 8> {
+    pub(super) fn continuation(&self, pace: Pace) -> Continuation<'_, Self, 6, F, N> {
         self.continuation_between([0.0, self.path.length()], pace)
     }
 
@@ -54,7 +62,7 @@ impl Along {
         &self,
         ends: [f64; 2],
         pace: Pace,
-    ) -> Continuation<'_, Self, 6, 2, 8> {
+    ) -> Continuation<'_, Self, 6, F, N> {
         let tolerance = self.path.base().tolerance();
         Continuation::new(self, tolerance, ends, pace)
     }
@@ -64,9 +72,9 @@ impl Along {
     pub(super) fn on_mesh(
         &self,
         mesh: Mesh,
-        station: &Station,
+        station: &Station<F, N>,
         pace: Pace,
-    ) -> Option<(Self, Station)> {
+    ) -> Option<(Self, Station<F, N>)> {
         let place = station.parameter;
         let other = self.on(mesh);
         let shape = self.shape_on(station, &other)?;
@@ -77,8 +85,8 @@ impl Along {
         let is_minimum = station.negative == 0;
         let problem = self.path.at(place).filter(|_| is_minimum)?;
         let proceed = &mut || ControlFlow::Continue(());
-        let found = minimum_next_to_on(&problem, &other.mesh, &shape, proceed);
-        let solved = found.certified().ok()?;
+        let found = D::minimum_next_to(&problem, &other.mesh, &shape, proceed);
+        let solved: &Solved<D, F, N> = found.certified().ok()?;
         let other = self.on(Mesh::of(&problem, &solved.program));
         let start = other
             .continuation(pace)
@@ -87,39 +95,48 @@ impl Along {
     }
 
     /// Whether the mesh carries a station.
-    pub(super) fn carries(&self, station: &Station) -> bool {
+    pub(super) fn carries(&self, station: &Station<F, N>) -> bool {
         self.meshed(station.parameter)
             .is_some_and(|(problem, program)| {
-                carries(&problem, &program, &station.at, station.objective)
+                D::carries(&problem, &program, &station.at, station.objective)
             })
     }
 
     /// The same branch on a mesh that should carry a station beyond, next to another station of this family.
     pub(super) fn on_mesh_that_carries(
         &self,
-        beyond: &Station,
-        station: &Station,
+        beyond: &Station<F, N>,
+        station: &Station<F, N>,
         pace: Pace,
-    ) -> Option<(Self, Station)> {
+    ) -> Option<(Self, Station<F, N>)> {
         let (problem, program) = self.meshed(beyond.parameter)?;
-        let mesh = mesh_that_carries(&problem, &program, &beyond.at)?;
+        let mesh = D::mesh_that_carries(&problem, &program, &beyond.at)?;
         self.on_mesh(mesh, station, pace)
     }
 
     /// The shape of a station on another mesh.
-    pub(super) fn shape_on(&self, station: &Station, to: &Self) -> Option<BeltPoint> {
+    pub(super) fn shape_on(&self, station: &Station<F, N>, to: &Self) -> Option<BeltPoint<F>> {
         let [own, other] = [self, to].map(|family| family.at(station.parameter));
-        Some(prolonged(&own?, &station.at.point, &other?))
+        Some(D::prolonged(&own?, &station.at.point, &other?))
     }
 
     /// A station's point with its multipliers on another mesh, or with other active edges.
-    fn with_multipliers_on(&self, station: &Station, to: &Self) -> Option<Stationary<BeltPoint>> {
+    fn with_multipliers_on(
+        &self,
+        station: &Station<F, N>,
+        to: &Self,
+    ) -> Option<Stationary<BeltPoint<F>>> {
         let [own, other] = [self, to].map(|family| family.at(station.parameter));
-        Some(prolonged_with_multipliers(&own?, &station.at, &other?))
+        Some(D::prolonged_with_multipliers(&own?, &station.at, &other?))
     }
 
     /// The start of a branch on another mesh, or with other active edges, next to a station of this family.
-    pub(super) fn carried_over(&self, station: &Station, to: &Self, pace: Pace) -> Option<Station> {
+    pub(super) fn carried_over(
+        &self,
+        station: &Station<F, N>,
+        to: &Self,
+        pace: Pace,
+    ) -> Option<Station<F, N>> {
         let place = station.parameter;
         let near = self.with_multipliers_on(station, to)?;
         to.continuation(pace)
@@ -127,19 +144,19 @@ impl Along {
     }
 
     /// The same path with the active edges for a shape at a place.
-    pub(super) fn with_active_sets_for(&self, place: f64, shape: &BeltPoint) -> Option<Self> {
+    pub(super) fn with_active_sets_for(&self, place: f64, shape: &BeltPoint<F>) -> Option<Self> {
         let (problem, mut program) = self.meshed(place)?;
-        if problem.has_active_sets(&program) {
-            problem.choose_active_sets(&mut program, shape);
+        if D::has_active_sets(&problem, &program) {
+            D::choose_active_sets(&problem, &mut program, shape);
         }
         Some(self.on(Mesh::of(&problem, &program)))
     }
 
     /// Whether the active sets of the programmes are right for a station.
-    pub(super) fn holds(&self, station: &Station) -> bool {
+    pub(super) fn holds(&self, station: &Station<F, N>) -> bool {
         self.meshed(station.parameter)
             .is_some_and(|(problem, program)| {
-                let fault = problem.active_set_fault(&program, &station.at.point);
+                let fault = D::active_set_fault(&problem, &program, &station.at.point);
                 fault.is_none()
             })
     }
@@ -154,21 +171,21 @@ impl Along {
     }
 }
 
-impl Family<6, 2, 8> for Along {
-    type Point = BeltPoint;
-    type Program = BeltProgram;
+impl<D: StripModel<F, N>, const F: usize, const N: usize> Family<6, F, N> for Along<D, F, N> {
+    type Point = BeltPoint<F>;
+    type Program = BeltProgram<D, F, N>;
 
-    fn at(&self, place: f64) -> Option<BeltProgram> {
-        self.path.at(place)?.program_on(&self.mesh)
+    fn at(&self, place: f64) -> Option<BeltProgram<D, F, N>> {
+        D::program_on(&self.path.at(place)?, &self.mesh)
     }
 
     /// The derivative is exact where a support moves; other changes of a scenario may change any part of the programme.
     fn conditions_by_parameter(
         &self,
-        program: &BeltProgram,
-        at: &Stationary<BeltPoint>,
+        program: &BeltProgram<D, F, N>,
+        at: &Stationary<BeltPoint<F>>,
         place: f64,
-    ) -> Option<Direction<8>> {
+    ) -> Option<Direction<N>> {
         let Some((support, motion)) = self.path.support_motion(place) else {
             return by_differences(self, at, place);
         };
@@ -243,16 +260,15 @@ mod tests {
     fn test_derivative_by_a_support_s_motion_agrees_with_differences() {
         let problem = problem();
         let equilibrium = solve(&problem, &mut || ControlFlow::Continue(()));
-        let solved = equilibrium.certified().unwrap();
+        let solved: &Solved = equilibrium.certified().unwrap();
         let poses = [
             (Vector3::new(0.2, 1.1, 0.1), Vector3::new(0.5, -0.2, 1.1)),
             (Vector3::new(0.4, 1.0, 0.3), Vector3::new(-0.4, 0.6, 0.3)),
         ];
         for motion in [Motion::Straight, Motion::Screw] {
-            let family = Along {
-                path: Path::poses(&problem, 1, &poses, motion).unwrap(),
-                mesh: Mesh::of(&problem, &solved.program),
-            };
+            let path = Path::poses(&problem, 1, &poses, motion).unwrap();
+            let family =
+                Along::<DevelopableEnergy, 2, 8>::new(path, Mesh::of(&problem, &solved.program));
             for place in [0.2, 0.7, 1.4] {
                 let program = family.at(place).unwrap();
                 let mut at = solved.at.clone();

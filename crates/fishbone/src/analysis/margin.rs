@@ -3,7 +3,8 @@
 use crate::analysis::continuation::NoBranch;
 use crate::analysis::family::{Along, Station};
 use crate::analysis::path::{Motion, NoPath, Path};
-use crate::equilibrium::{Equilibrium, Uncertified};
+use crate::equilibrium::model::StripModel;
+use crate::equilibrium::{AnySolved, Equilibrium, Solved, Uncertified};
 use crate::geometry::{Pose, exp, log};
 use crate::names::named;
 use crate::problem::Mesh;
@@ -133,10 +134,14 @@ impl Equilibrium {
         settings: &MarginSettings,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Result<Option<Margin>, NoMargin> {
-        let direction = direction.normalize();
-        let found = self.boundary(support, &direction, reach, settings, proceed)?;
-        let margin = found.map(|boundary| boundary.margin);
-        Ok(margin.map(|margin| self.with_confirmation(support, margin, settings, proceed)))
+        match self.certified_any()? {
+            AnySolved::Developable(solved) => {
+                Search::new(self, solved, support, settings)?.along(direction, reach, proceed)
+            }
+            AnySolved::Shell(solved) => {
+                Search::new(self, solved, support, settings)?.along(direction, reach, proceed)
+            }
+        }
     }
 
     /// The nearest loss of stability that a local search finds. The search starts from places along the six axes and along
@@ -153,14 +158,75 @@ impl Equilibrium {
         settings: &MarginSettings,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Result<Option<Margin>, NoMargin> {
+        match self.certified_any()? {
+            AnySolved::Developable(solved) => {
+                Search::new(self, solved, support, settings)?.nearest(reach, proceed)
+            }
+            AnySolved::Shell(solved) => {
+                Search::new(self, solved, support, settings)?.nearest(reach, proceed)
+            }
+        }
+    }
+}
+
+/// The search for the loss of stability of an equilibrium as one of its supports moves.
+struct Search<'a, D, const F: usize, const N: usize> {
+    equilibrium: &'a Equilibrium,
+    solved: &'a Solved<D, F, N>,
+    support: usize,
+    /// Pose of the support at the equilibrium.
+    from: Pose,
+    settings: &'a MarginSettings,
+}
+
+impl<'a, D: StripModel<F, N>, const F: usize, const N: usize> Search<'a, D, F, N> {
+    /// The search from a stable equilibrium, given with its solved programme, by a support that holds all of a pose.
+    fn new(
+        equilibrium: &'a Equilibrium,
+        solved: &'a Solved<D, F, N>,
+        support: usize,
+        settings: &'a MarginSettings,
+    ) -> Result<Self, NoMargin> {
+        if equilibrium.stable() != Some(true) {
+            return Err(NoMargin::NotStable);
+        }
+        let from = equilibrium.problem.clamp(support);
+        Ok(Self {
+            equilibrium,
+            solved,
+            support,
+            from: from.ok_or(NoMargin::NotClamped(support))?,
+            settings,
+        })
+    }
+
+    /// The loss of stability along a direction of any length.
+    fn along(
+        &self,
+        direction: &Vector6<f64>,
+        reach: f64,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Result<Option<Margin>, NoMargin> {
+        let found = self.boundary(&direction.normalize(), reach, proceed)?;
+        let margin = found.map(|boundary| boundary.margin);
+        Ok(margin.map(|margin| self.with_confirmation(margin, proceed)))
+    }
+
+    /// The nearest loss of stability that a local search finds.
+    fn nearest(
+        &self,
+        reach: f64,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Result<Option<Margin>, NoMargin> {
+        let settings = self.settings;
         let axes = (0..6).flat_map(|axis| [1.0, -1.0].map(|sign| sign * Vector6::ith(axis, 1.0)));
-        let steepest = self.falls(support, settings, proceed)?;
+        let steepest = self.falls(proceed)?;
         let mut found = Vec::new();
         let mut lost = None;
         let mut look = |direction: &Vector6<f64>, found: &mut Vec<Boundary>| {
             let farther = |nearest: &Boundary| settings.farther * nearest.margin.distance;
             let far = found.first().map_or(reach, farther).min(reach);
-            match self.boundary(support, direction, far, settings, proceed) {
+            match self.boundary(direction, far, proceed) {
                 Ok(boundary) => found.extend(boundary),
                 Err(NoMargin::Lost(share)) => lost = Some(share),
                 Err(other) => return Err(other),
@@ -191,29 +257,29 @@ impl Equilibrium {
         found.truncate(settings.refined);
         let mut margins = Vec::new();
         for boundary in found {
-            margins.push(self.nearest_from(support, boundary, settings, proceed)?);
+            margins.push(self.nearest_from(boundary, proceed)?);
         }
         let nearest = margins
             .into_iter()
             .min_by(|a, b| a.distance.total_cmp(&b.distance));
-        Ok(nearest.map(|nearest| self.with_confirmation(support, nearest, settings, proceed)))
+        Ok(nearest.map(|nearest| self.with_confirmation(nearest, proceed)))
     }
 
     /// The margin, confirmed where the equilibrium on a mesh twice as fine has much the same along its direction.
     fn with_confirmation(
         &self,
-        support: usize,
         margin: Margin,
-        settings: &MarginSettings,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Margin {
         /// Difference of the distances, as a share of the distance.
         const SAME: f64 = 0.1;
-        let elements = self.developable().map(|s| s.program.elements().count());
-        let fine = elements.and_then(|count| self.refined(2 * count, proceed));
+        let elements = self.solved.program.elements().count();
         let far = (1.0 + SAME) * margin.distance;
-        let on_fine = fine.and_then(|fine| {
-            let found = fine.boundary(support, &margin.direction, far, settings, proceed);
+        let fine = self.equilibrium.refined(2 * elements, proceed);
+        let on_fine = fine.as_ref().and_then(|fine| {
+            let solved: &Solved<D, F, N> = fine.certified().ok()?;
+            let fine = Search::new(fine, solved, self.support, self.settings).ok()?;
+            let found = fine.boundary(&margin.direction, far, proceed);
             found.ok().flatten()
         });
         let is_same = |other: &Boundary| other.margin.distance >= (1.0 - SAME) * margin.distance;
@@ -227,24 +293,22 @@ impl Equilibrium {
     /// the direction taken.
     fn nearest_from(
         &self,
-        support: usize,
         mut best: Boundary,
-        settings: &MarginSettings,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Result<Margin, NoMargin> {
-        for _ in 0..settings.rounds {
+        for _ in 0..self.settings.rounds {
             let Some(normal) = best.across.filter(|_| best.margin.is_fold) else {
                 break;
             };
             let towards = normal * normal.dot(&best.margin.direction).signum();
-            if 1.0 - towards.dot(&best.margin.direction) < settings.same_way {
+            if 1.0 - towards.dot(&best.margin.direction) < self.settings.same_way {
                 break;
             }
             // The whole turn to the normal, or half of it if the whole turn leads to no nearer place.
             let mut nearer = None;
             for way in [towards, (towards + best.margin.direction).normalize()] {
                 let far = best.margin.distance;
-                nearer = match self.boundary(support, &way, far, settings, proceed) {
+                nearer = match self.boundary(&way, far, proceed) {
                     Ok(found) => found,
                     Err(NoMargin::Lost(_)) => None,
                     Err(other) => return Err(other),
@@ -264,8 +328,6 @@ impl Equilibrium {
     /// Directions in which the lowest eigenvalues of the second variation fall fastest, by central differences.
     fn falls(
         &self,
-        support: usize,
-        settings: &MarginSettings,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Result<Vec<Vector6<f64>>, NoMargin> {
         /// Lowest eigenvalues, each of which gives a direction, a number.
@@ -275,11 +337,10 @@ impl Equilibrium {
             let mut values = [[0.0; LOWEST]; 2];
             for (sign, values) in [1.0, -1.0].into_iter().zip(&mut values) {
                 let direction = sign * Vector6::ith(axis, 1.0);
-                let way = Way::new(self, support, &direction, settings.difference, settings)?;
-                let solved = self.certified()?;
+                let way = self.way(&direction, self.settings.difference)?;
                 let continuation = way.continuation();
                 let modes = continuation
-                    .start(&solved.at, way.length(), true)
+                    .start(&self.solved.at, way.length(), true)
                     .and_then(|station| continuation.modes(&station, LOWEST));
                 let Some(modes) = modes.filter(|modes| modes.len() == LOWEST) else {
                     return Ok(Vec::new());
@@ -302,20 +363,17 @@ impl Equilibrium {
     /// The place where stability is lost along a direction of norm 1.
     fn boundary(
         &self,
-        support: usize,
         direction: &Vector6<f64>,
         reach: f64,
-        settings: &MarginSettings,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Result<Option<Boundary>, NoMargin> {
-        let way = Way::new(self, support, direction, reach, settings)?;
-        let solved = self.certified()?;
+        let way = self.way(direction, reach)?;
         let continuation = way.continuation();
-        let start = continuation.start(&solved.at, 0.0, true);
+        let start = continuation.start(&self.solved.at, 0.0, true);
         let start = start.ok_or(NoBranch::Singular)?;
         let curve = continuation.trace(start, &mut |_| proceed());
         let length = way.length();
-        let is_open = |station: &Station| station.negative == 0 && way.family.holds(station);
+        let is_open = |station: &Station<F, N>| station.negative == 0 && way.family.holds(station);
         let stable = curve
             .stations
             .iter()
@@ -340,9 +398,9 @@ impl Equilibrium {
         let pose = way.pose_at(distance);
         let rows = continuation.multipliers_along(event);
         let across = rows.map(|rows| {
-            let held = &solved.program.supports[support];
+            let held = &self.solved.program.supports[self.support];
             let at = &event.station.at.point.poses[held.node];
-            let (force, moment) = held.reaction(at, &rows_of(&rows, support));
+            let (force, moment) = held.reaction(at, &rows_of(&rows, self.support));
             Vector6::from_iterator(force.iter().chain(&moment).copied()).normalize()
         });
         Ok(Some(Boundary {
@@ -357,50 +415,23 @@ impl Equilibrium {
             across,
         }))
     }
-}
 
-/// The path of a support along a direction of norm 1.
-struct Way {
-    family: Along,
-    from: Pose,
-    direction: Vector6<f64>,
-    /// Unit of length U.
-    unit: f64,
-    pace: Pace,
-}
-
-impl Way {
-    /// The path over a distance, in legs that turn by less than half a turn.
-    fn new(
-        equilibrium: &Equilibrium,
-        support: usize,
-        direction: &Vector6<f64>,
-        reach: f64,
-        settings: &MarginSettings,
-    ) -> Result<Self, NoMargin> {
-        let solved = equilibrium.certified()?;
-        if equilibrium.stable() != Some(true) {
-            return Err(NoMargin::NotStable);
-        }
-        let problem = &equilibrium.problem;
-        let from = problem.clamp(support);
-        let from = from.ok_or(NoMargin::NotClamped(support))?;
+    /// The path over a distance along a direction of norm 1, in legs that turn by less than half a turn.
+    fn way(&self, direction: &Vector6<f64>, reach: f64) -> Result<Way<D, F, N>, NoMargin> {
+        let (problem, settings) = (&self.equilibrium.problem, self.settings);
         let unit = problem.units().length;
         let legs = (reach * direction.fixed_rows::<3>(3).norm() / settings.leg)
             .ceil()
             .max(1.0);
         let ends = (1..=legs as usize).map(|leg| {
-            let end = displaced(&from, direction, unit, reach * leg as f64 / legs);
+            let end = displaced(&self.from, direction, unit, reach * leg as f64 / legs);
             (end.position, log(&end.frame))
         });
         let poses: Vec<_> = ends.collect();
-        let path = Path::poses(problem, support, &poses, Motion::Straight);
-        Ok(Self {
-            family: Along {
-                path: path?,
-                mesh: Mesh::of(problem, &solved.program),
-            },
-            from,
+        let path = Path::poses(problem, self.support, &poses, Motion::Straight)?;
+        Ok(Way {
+            family: Along::new(path, Mesh::of(problem, &self.solved.program)),
+            from: self.from,
             direction: *direction,
             unit,
             pace: Pace {
@@ -410,7 +441,19 @@ impl Way {
             },
         })
     }
+}
 
+/// The path of a support along a direction of norm 1.
+struct Way<D, const F: usize, const N: usize> {
+    family: Along<D, F, N>,
+    from: Pose,
+    direction: Vector6<f64>,
+    /// Unit of length U.
+    unit: f64,
+    pace: Pace,
+}
+
+impl<D: StripModel<F, N>, const F: usize, const N: usize> Way<D, F, N> {
     /// The support's pose at a distance along the path.
     fn pose_at(&self, far: f64) -> Pose {
         displaced(&self.from, &self.direction, self.unit, far)
@@ -421,7 +464,7 @@ impl Way {
         self.family.path.length()
     }
 
-    fn continuation(&self) -> Continuation<'_, Along, 6, 2, 8> {
+    fn continuation(&self) -> Continuation<'_, Along<D, F, N>, 6, F, N> {
         self.family.continuation(self.pace)
     }
 }

@@ -10,7 +10,8 @@ use crate::geometry::{Pose, exp, log};
 use crate::problem::program::{BeltPoint, BeltProgram, Hold, NodeSupport, ROWS};
 use crate::problem::{Mesh, Problem};
 use crate::scenario::Component;
-use nalgebra::{Matrix3, Vector2, Vector3};
+use crate::strip::density::Density;
+use nalgebra::{Matrix3, SVector, Vector3};
 use stagewise::{Outcome, Stationary, assess};
 use std::ops::ControlFlow;
 use std::sync::OnceLock;
@@ -250,7 +251,11 @@ impl Lifted {
 
 /// The pose at which a support, given by its place in the scenario, holds a board flat where the other supports hold it; `None`
 /// where these do not hold it flat at rest. Units: those of the programme.
-pub(crate) fn flat_pose(problem: &Problem, program: &BeltProgram, support: usize) -> Option<Pose> {
+pub(crate) fn flat_pose<D: Density<F>, const F: usize, const N: usize>(
+    problem: &Problem,
+    program: &BeltProgram<D, F, N>,
+    support: usize,
+) -> Option<Pose> {
     /// Deviation up to which supports hold a board flat, in U and rad.
     const NONE: f64 = 1e-9;
     let flat = laid_flat(problem, program, Some(support))?;
@@ -264,7 +269,10 @@ pub(crate) fn flat_pose(problem: &Problem, program: &BeltProgram, support: usize
 }
 
 /// By how much a support is off a shape in the coordinates that it holds: displacement, and turn in world axes.
-fn deviation(support: &NodeSupport, shape: &BeltPoint) -> (Vector3<f64>, Vector3<f64>) {
+fn deviation<const F: usize>(
+    support: &NodeSupport,
+    shape: &BeltPoint<F>,
+) -> (Vector3<f64>, Vector3<f64>) {
     let pose = &shape.poses[support.node];
     let way = |i: usize| support.position[i].map_or(0.0, |held| held - pose.position[i]);
     let turn = support.hold.frame().map_or_else(Vector3::zeros, |held| {
@@ -276,7 +284,11 @@ fn deviation(support: &NodeSupport, shape: &BeltPoint) -> (Vector3<f64>, Vector3
 
 /// The flat board on a programme, where the first support that holds a whole pose holds it, but for one that does not count;
 /// `None` without such a support, and of a board that is not at rest where it is flat.
-fn laid_flat(problem: &Problem, program: &BeltProgram, but: Option<usize>) -> Option<BeltPoint> {
+fn laid_flat<D: Density<F>, const F: usize, const N: usize>(
+    problem: &Problem,
+    program: &BeltProgram<D, F, N>,
+    but: Option<usize>,
+) -> Option<BeltPoint<F>> {
     if program.is_curled() || program.is_loaded() || !program.links.is_empty() {
         return None;
     }
@@ -292,7 +304,7 @@ fn laid_flat(problem: &Problem, program: &BeltProgram, but: Option<usize>) -> Op
     };
     let nodes = program.pieces.len() + 1;
     let mut flat = BeltPoint {
-        fields: vec![Vector2::zeros(); nodes],
+        fields: vec![SVector::zeros(); nodes],
         poses: vec![start; nodes],
     };
     program.carry(&mut flat);

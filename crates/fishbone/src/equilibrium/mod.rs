@@ -8,6 +8,7 @@ pub(crate) mod guess;
 mod intrinsic;
 mod judged;
 mod lifted;
+pub(crate) mod model;
 mod refinement;
 mod search;
 pub(crate) mod shell;
@@ -33,16 +34,16 @@ use crate::strip::spine::Spine;
 use crate::surface::{HighestPoint, highest_point};
 use accuracy::Estimate;
 use guess::{folded_band, guess, waved};
+use model::StripModel;
 use nalgebra::{Vector2, Vector3};
-use stagewise::{Distance, Inertia, Multipliers, Residuals, Stationary, Values};
+use stagewise::{Inertia, Multipliers, Residuals, Stationary, Values};
 use std::ops::ControlFlow;
 use std::sync::OnceLock;
 use thiserror::Error;
 
-pub(crate) use intrinsic::{of_solution, of_solution_on_mesh};
+pub(crate) use intrinsic::of_solution;
 pub(crate) use lifted::flat_pose;
-pub(crate) use refinement::{carries, largest_change, mesh_that_carries, turns_too_far};
-pub(crate) use search::{prolonged, prolonged_with_multipliers};
+pub(crate) use refinement::{largest_change, turns_too_far};
 
 named! {
     /// How a solve ended.
@@ -132,17 +133,11 @@ pub enum Uncertified {
         /// How the solve ended.
         message: String,
     },
-    /// The computation knows developable belts only.
-    #[error(
-        "energy = \"shell\" has no path, tracker, sensitivity or snap margin: use energy = \"wunderlich\""
-    )]
-    Shell,
 }
 
 named!(impl Uncertified {
     NoMultipliers = "no_multipliers",
     NotConverged = "not_converged",
-    Shell = "shell",
 });
 
 /// The solved programme of a belt.
@@ -211,41 +206,43 @@ impl Equilibrium {
     /// # Errors
     ///
     /// [`Uncertified`] otherwise.
-    pub(crate) fn certified(&self) -> Result<&Solved, Uncertified> {
-        match self.certified_any()? {
-            AnySolved::Developable(solved) => Ok(solved),
-            AnySolved::Shell(_) => Err(Uncertified::Shell),
+    pub(crate) fn certified_any(&self) -> Result<&AnySolved, Uncertified> {
+        let solved = self.solved.as_ref().ok_or(Uncertified::NoMultipliers)?;
+        match self.status {
+            Status::Converged => Ok(solved),
+            Status::Infeasible | Status::NotConverged => Err(self.not_converged()),
+        }
+    }
+
+    /// As [`Self::certified_any`], of a model of the strip.
+    pub(crate) fn certified<D: StripModel<F, N>, const F: usize, const N: usize>(
+        &self,
+    ) -> Result<&Solved<D, F, N>, Uncertified> {
+        D::solved(self.certified_any()?).ok_or_else(|| self.not_converged())
+    }
+
+    fn not_converged(&self) -> Uncertified {
+        Uncertified::NotConverged {
+            message: self.message.clone(),
         }
     }
 
     /// The programme of a developable belt and its solution, converged or not.
     pub(crate) fn developable(&self) -> Option<&Solved> {
-        match self.solved.as_ref()? {
-            AnySolved::Developable(solved) => Some(solved),
-            AnySolved::Shell(_) => None,
-        }
-    }
-
-    /// As [`Self::certified`], of any density.
-    pub(crate) fn certified_any(&self) -> Result<&AnySolved, Uncertified> {
-        let solved = self.solved.as_ref().ok_or(Uncertified::NoMultipliers)?;
-        match self.status {
-            Status::Converged => Ok(solved),
-            Status::Infeasible | Status::NotConverged => Err(Uncertified::NotConverged {
-                message: self.message.clone(),
-            }),
-        }
+        DevelopableEnergy::solved(self.solved.as_ref()?)
     }
 
     /// Whether this is an equilibrium of its mesh, be it one of the belt or not.
     pub(crate) fn is_of_its_mesh(&self) -> bool {
-        self.solved_on_mesh().is_some()
+        self.solved_on_mesh::<DevelopableEnergy, 2, 8>().is_some()
     }
 
     /// The programme and its solution, if this is an equilibrium of its mesh, be it one of the belt or not.
-    pub(crate) fn solved_on_mesh(&self) -> Option<&Solved> {
+    pub(crate) fn solved_on_mesh<D: StripModel<F, N>, const F: usize, const N: usize>(
+        &self,
+    ) -> Option<&Solved<D, F, N>> {
         let is_converged = self.status == Status::Converged;
-        let solved = self.developable();
+        let solved = D::solved(self.solved.as_ref()?);
         solved.filter(|solved| is_converged || solved.is_of_mesh_alone)
     }
 
@@ -318,7 +315,7 @@ impl Equilibrium {
         let solved = self.developable()?;
         let program = self.problem.program_on(mesh)?;
         let shape = search::prolong(&solved.program, &solved.at.point, &program);
-        let found = minimum_next_to_on(&self.problem, mesh, &shape, proceed);
+        let found = DevelopableEnergy::minimum_next_to(&self.problem, mesh, &shape, proceed);
         found.is_minimum().then_some(found)
     }
 
@@ -504,16 +501,6 @@ pub(crate) fn from_fields(
     minimum_from(problem, &shape, proceed)
 }
 
-/// The equilibrium on a mesh from a shape that is near to a minimum; from the guess if this shape leads to no minimum.
-pub(crate) fn solve_near(
-    problem: &Problem,
-    mesh: &Mesh,
-    shape: &BeltPoint,
-    proceed: &mut dyn FnMut() -> ControlFlow<()>,
-) -> Equilibrium {
-    intrinsic::solve(problem, Start::Near(mesh, shape), proceed)
-}
-
 /// Whether a problem is that of a slender belt on a mesh that follows the error.
 pub(crate) fn is_slender_on_graded_mesh(problem: &Problem) -> bool {
     !problem.has_fixed_mesh() && refinement::is_slender(problem)
@@ -568,38 +555,5 @@ pub(crate) fn minimum_next_to(
     proceed: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Equilibrium {
     let mesh = Mesh::uniform(problem, problem.elements());
-    minimum_next_to_on(problem, &mesh, shape, proceed)
-}
-
-/// The minimum to which a belt snaps from a shape that is no minimum: of those that a descent from the shape and a search near
-/// to it find, the one next to the shape; `None` where neither finds any.
-pub(crate) fn snapped_from(
-    problem: &Problem,
-    mesh: &Mesh,
-    shape: &BeltPoint,
-    proceed: &mut dyn FnMut() -> ControlFlow<()>,
-) -> Option<Equilibrium> {
-    let starts = [Start::Downhill(mesh, shape), Start::Near(mesh, shape)];
-    let found = starts.map(|start| intrinsic::solve(problem, start, proceed));
-    let distance = |found: &Equilibrium| {
-        let solved = found.certified().ok();
-        solved.map_or(f64::INFINITY, |solved| solved.at.point.distance(shape))
-    };
-    let is_minimum = |found: &Equilibrium| {
-        let is_unstable =
-            found.stability.and_then(|stability| stability.is_stable()) == Some(false);
-        distance(found).is_finite() && !is_unstable
-    };
-    let minima = found.into_iter().filter(is_minimum);
-    minima.min_by(|a, b| distance(a).total_cmp(&distance(b)))
-}
-
-/// The minimum next to a shape on a mesh, whatever its active sets.
-pub(crate) fn minimum_next_to_on(
-    problem: &Problem,
-    mesh: &Mesh,
-    shape: &BeltPoint,
-    proceed: &mut dyn FnMut() -> ControlFlow<()>,
-) -> Equilibrium {
-    intrinsic::solve(problem, Start::Close(mesh, shape), proceed)
+    DevelopableEnergy::minimum_next_to(problem, &mesh, shape, proceed)
 }

@@ -8,6 +8,7 @@ use super::search::{Search, prolong, prolonged};
 use crate::problem::program::{BeltPoint, BeltProgram};
 use crate::problem::{Mesh, Problem};
 use crate::scenario::SAME_PLACE;
+use crate::strip::density::Density;
 use crate::strip::element::Element;
 use nalgebra::Vector2;
 use slender::narrowed;
@@ -252,36 +253,58 @@ pub(crate) fn mesh_that_carries(
 }
 
 /// Whether an element of a shape turns so far that its equations are no longer those of a belt.
-pub(crate) fn turns_too_far(program: &BeltProgram, shape: &BeltPoint) -> bool {
+pub(crate) fn turns_too_far<D: Density<F>, const F: usize, const N: usize>(
+    program: &BeltProgram<D, F, N>,
+    shape: &BeltPoint<F>,
+) -> bool {
     largest_turn(program, shape) > MOST_TURN
 }
 
 /// Largest angle by which an element of a shape turns.
-fn largest_turn(program: &BeltProgram, shape: &BeltPoint) -> f64 {
-    let turns = program.elements().map(|element| turn_of(shape, element));
+fn largest_turn<D: Density<F>, const F: usize, const N: usize>(
+    program: &BeltProgram<D, F, N>,
+    shape: &BeltPoint<F>,
+) -> f64 {
+    let turns = program.elements();
+    let turns = turns.map(|element| turn_of(program, shape, element));
     turns.fold(0.0, f64::max)
+}
+
+/// Angle by which an element of a shape turns if it turns as fast all along as at its tighter end.
+fn turn_of<D: Density<F>, const F: usize, const N: usize>(
+    program: &BeltProgram<D, F, N>,
+    shape: &BeltPoint<F>,
+    (k, element): (usize, &Element),
+) -> f64 {
+    let rate = |node: usize| {
+        let [bend, torsion] = rates(program, shape, node);
+        bend.hypot(torsion).hypot(element.geodesic)
+    };
+    element.length * rate(k).max(rate(k + 1))
 }
 
 /// Largest difference between the angles by which an element of a shape would turn if it turned all along as at either end, in
 /// rad: the error of a mesh grows with it.
-pub(crate) fn largest_change(program: &BeltProgram, shape: &BeltPoint) -> f64 {
+pub(crate) fn largest_change<D: Density<F>, const F: usize, const N: usize>(
+    program: &BeltProgram<D, F, N>,
+    shape: &BeltPoint<F>,
+) -> f64 {
     let change = |(k, element): (usize, &Element)| {
-        let rates = [k, k + 1].map(|node| {
-            let [bend, slope] = shape.fields[node].into();
-            Vector2::new(bend, slope * bend)
-        });
-        element.length * (rates[1] - rates[0]).norm()
+        let [own, next] = [k, k + 1].map(|node| Vector2::from(rates(program, shape, node)));
+        element.length * (next - own).norm()
     };
     program.elements().map(change).fold(0.0, f64::max)
 }
 
-/// Angle by which an element of a shape turns if it turns as fast all along as at its tighter end.
-fn turn_of(shape: &BeltPoint, (k, element): (usize, &Element)) -> f64 {
-    let rate = |node: usize| {
-        let [bend, slope] = shape.fields[node].into();
-        bend.hypot(slope * bend).hypot(element.geodesic)
-    };
-    element.length * rate(k).max(rate(k + 1))
+/// Bend and torsion at a node.
+fn rates<D: Density<F>, const F: usize, const N: usize>(
+    program: &BeltProgram<D, F, N>,
+    shape: &BeltPoint<F>,
+    node: usize,
+) -> [f64; 2] {
+    let fields: &[f64; F] = &shape.fields[node].data.0[0];
+    let [torsion, bend] = program.model.torsion_and_bend(fields);
+    [bend, torsion]
 }
 
 /// Whether ribs turn with a density that does not know the width: they turn from element to element as the belt is led, the more
@@ -515,7 +538,7 @@ impl Level {
     }
 
     fn turn_of(&self, element: (usize, &Element)) -> f64 {
-        turn_of(&self.solution.at.point, element)
+        turn_of(&self.program, &self.solution.at.point, element)
     }
 
     /// A mesh on which the error should be within the accuracy. A belt that may slide along itself has no place on a graded

@@ -1,7 +1,7 @@
 //! Supports that are turned by more than half a turn: the belt is followed there from less.
 
 use super::side::wound_on_side_of_bulge;
-use super::{Equilibrium, Status, beside_the_guess, minimum_next_to, of_solution};
+use super::{Equilibrium, Solved, Status, beside_the_guess, minimum_next_to, of_solution};
 use crate::problem::program::{BeltPoint, BeltProgram, Hold, Piece};
 use crate::problem::{Mesh, Problem, number};
 use nalgebra::{Rotation3, UnitQuaternion, Vector3};
@@ -200,7 +200,7 @@ impl Way {
         [from, to]: [f64; 2],
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Option<bool> {
-        let solved = found.certified().ok()?;
+        let solved: &Solved = found.certified().ok()?;
         let mesh = Mesh::of(&self.goal, &solved.program);
         /// Displacement beyond which the next minimum is another one, in U.
         const ANOTHER: f64 = 0.05;
@@ -224,7 +224,7 @@ impl Way {
         };
         next.iterations += found.iterations + followed.iterations;
         *found = next;
-        let after = found.certified().ok()?;
+        let after: &Solved = found.certified().ok()?;
         Some(followed.jump > 0.0 || after.at.point.distance(&before) > ANOTHER)
     }
 }
@@ -312,7 +312,7 @@ fn held_frames<'a>(
 /// A rotation and a whole turn more are two unit quaternions of opposite sign; those of the supports have the signs of their
 /// rotation vectors, and those of the belt are continuous along it.
 fn parities(found: &Equilibrium) -> Vec<bool> {
-    let Ok(solved) = found.certified() else {
+    let Ok(solved): Result<&Solved, _> = found.certified() else {
         return Vec::new();
     };
     let frame = |node: usize| {

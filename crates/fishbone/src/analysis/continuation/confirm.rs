@@ -2,6 +2,7 @@
 
 use super::trace::{Crossing, Stretch, trace};
 use crate::analysis::family::Station;
+use crate::equilibrium::model::StripModel;
 use stagewise::{Distance, Pace};
 use std::ops::ControlFlow;
 
@@ -20,16 +21,16 @@ const STARTS: [usize; 2] = [4, 5];
 /// There the branch is followed from a station before the event that is farther from it than the event on the finer mesh may
 /// be, up to the event or past it. Events that the bounds of single elements make, where ribs turn over, lie elsewhere on
 /// every mesh.
-pub(super) fn is_confirmed(
-    stretch: &Stretch,
+pub(super) fn is_confirmed<D: StripModel<F, N>, const F: usize, const N: usize>(
+    stretch: &Stretch<D, F, N>,
     state: usize,
-    event: &Crossing,
+    event: &Crossing<F, N>,
     pace: Pace,
-    proceed: &mut dyn FnMut(&Station) -> ControlFlow<()>,
+    proceed: &mut dyn FnMut(&Station<F, N>) -> ControlFlow<()>,
 ) -> bool {
     let family = &stretch.family;
     let stations = &stretch.stations[..state];
-    let off = |station: &Station| station.parameter - event.parameter;
+    let off = |station: &Station<F, N>| station.parameter - event.parameter;
     let far = stations.iter().rev().filter(|s| off(s).abs() > SAME_PLACE);
     let far = far.step_by(STARTS[1]).take(STARTS[0]);
     let mut starts = far.chain(stations.first());

@@ -5,25 +5,28 @@ use super::trace::{Crossing, Stretch, trace};
 use super::{Branch, CrossingSettings, Diagram, End, Event, Kind, Origin, Snapped, State};
 use crate::analysis::family::{Along, Station};
 use crate::analysis::symmetry::{SAME, are_images, sampled};
-use crate::equilibrium::{Equilibrium, of_solution, snapped_from, solve_near};
+use crate::equilibrium::model::{StripModel, snapped_from};
+use crate::equilibrium::{Equilibrium, Solved};
 use crate::geometry::Pose;
 use crate::problem::Mesh;
 use stagewise::{Distance, Events, Family, Pace, Turn};
+use std::marker::PhantomData;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
 /// Traces a branch from a station, and the branches off it, into an empty diagram.
-pub(super) fn run(
-    family: &Along,
+pub(super) fn run<D: StripModel<F, N>, const F: usize, const N: usize>(
+    family: &Along<D, F, N>,
     pace: Pace,
     diagram: Diagram,
-    start: Station,
+    start: Station<F, N>,
     proceed: &mut dyn FnMut(usize, f64) -> ControlFlow<()>,
 ) -> Diagram {
-    let mut search = Search {
+    let mut search = Search::<D, F, N> {
         pace,
         proceed,
         diagram,
+        model: PhantomData,
     };
     match search.diagram.settings.snaps {
         true => search.lead(family, start),
@@ -35,17 +38,23 @@ pub(super) fn run(
 }
 
 /// A diagram in the making.
-struct Search<'a> {
+struct Search<'a, D, const F: usize, const N: usize> {
     pace: Pace,
     proceed: &'a mut dyn FnMut(usize, f64) -> ControlFlow<()>,
     diagram: Diagram,
+    model: PhantomData<D>,
 }
 
-impl Search<'_> {
+impl<D: StripModel<F, N>, const F: usize, const N: usize> Search<'_, D, F, N> {
     /// Traces a branch, then the branches off it; gives the reason of its end.
-    fn trace(&mut self, origin: Option<Origin>, family: &Along, start: Station) -> Option<End> {
+    fn trace(
+        &mut self,
+        origin: Option<Origin>,
+        family: &Along<D, F, N>,
+        start: Station<F, N>,
+    ) -> Option<End> {
         let index = self.diagram.branches.len();
-        let proceed = &mut |station: &Station| (self.proceed)(index, station.parameter);
+        let proceed = &mut |station: &Station<F, N>| (self.proceed)(index, station.parameter);
         let (mut stretches, end) = trace(family, start, self.pace, proceed);
         let last = stretches.last_mut()?;
         let end = without_mirror_image(last, End::from(end));
@@ -72,7 +81,7 @@ impl Search<'_> {
     }
 
     /// Adds the event of other active edges at the first state of a stretch.
-    fn add_switch(&mut self, branch: usize, state: usize, stretch: &Stretch) {
+    fn add_switch(&mut self, branch: usize, state: usize, stretch: &Stretch<D, F, N>) {
         let start = &stretch.stations[0];
         let branch = &mut self.diagram.branches[branch];
         branch.events.push(Event {
@@ -91,8 +100,8 @@ impl Search<'_> {
         branch: usize,
         first: usize,
         state: usize,
-        event: &Crossing,
-        stretch: &Stretch,
+        event: &Crossing<F, N>,
+        stretch: &Stretch<D, F, N>,
     ) {
         let found = self.found_at(branch, state, event, stretch, None);
         let origin = Origin {
@@ -129,7 +138,7 @@ impl Search<'_> {
 
     /// Leads the belt along the path: its minima, and where one is lost the minimum to which the belt goes on. A branch ends
     /// where the belt snaps.
-    fn lead(&mut self, family: &Along, start: Station) {
+    fn lead(&mut self, family: &Along<D, F, N>, start: Station<F, N>) {
         let (mut family, mut start) = (family.clone(), start);
         let mut origin = None;
         while self.diagram.branches.len() < self.diagram.settings.branches {
@@ -156,9 +165,9 @@ impl Search<'_> {
     fn lead_to_snap(
         &mut self,
         index: usize,
-        mut family: Along,
-        mut start: Station,
-    ) -> Option<(Along, Station)> {
+        mut family: Along<D, F, N>,
+        mut start: Station<F, N>,
+    ) -> Option<(Along<D, F, N>, Station<F, N>)> {
         /// Ratio of successive distances past an event that the branch comes back to, dimensionless.
         const FARTHER: f64 = 10.0;
         let (mut past, mut landing) = (self.diagram.settings.crossings.past, None);
@@ -172,7 +181,7 @@ impl Search<'_> {
             if pace.stations < 2 {
                 return None;
             }
-            let proceed = &mut |station: &Station| (self.proceed)(index, station.parameter);
+            let proceed = &mut |station: &Station<F, N>| (self.proceed)(index, station.parameter);
             let (stretches, end) = trace(&family, start, pace, proceed);
             let mut state = first;
             for (place, stretch) in stretches.iter().enumerate() {
@@ -216,10 +225,10 @@ impl Search<'_> {
         &mut self,
         branch: usize,
         state: usize,
-        event: &Crossing,
-        stretch: &Stretch,
+        event: &Crossing<F, N>,
+        stretch: &Stretch<D, F, N>,
         led: Option<f64>,
-    ) -> Found {
+    ) -> Found<F, N> {
         let crossing = self.crossing(event, &stretch.stations[..state], &stretch.family);
         let before = state.checked_sub(1).map(|before| &stretch.stations[before]);
         let is_loss = event.negative[0] == 0 && event.negative[1] > 0;
@@ -231,7 +240,7 @@ impl Search<'_> {
             .then(|| self.landed(event, &crossing, before, past, &stretch.family))
             .flatten();
         let pace = self.pace;
-        let ask = &mut |station: &Station| (self.proceed)(branch, station.parameter);
+        let ask = &mut |station: &Station<F, N>| (self.proceed)(branch, station.parameter);
         let confirmed = is_confirmed(stretch, state, event, pace, ask);
         Found {
             crossing,
@@ -241,7 +250,13 @@ impl Search<'_> {
     }
 
     /// Adds an event at a state of a branch; gives whether the belt snaps there.
-    fn add_found(&mut self, branch: usize, state: usize, event: &Crossing, found: &Found) -> bool {
+    fn add_found(
+        &mut self,
+        branch: usize,
+        state: usize,
+        event: &Crossing<F, N>,
+        found: &Found<F, N>,
+    ) -> bool {
         let is_snap = |landed: &&Snapped| {
             let (to, jump) = (&landed.equilibrium, landed.jump);
             let jump = jump / to.problem().units().length;
@@ -264,10 +279,10 @@ impl Search<'_> {
     fn start_at(
         &self,
         landed: &Snapped,
-        event: &Crossing,
-        stretch: &Stretch,
-    ) -> Option<(Along, Station)> {
-        let solved = landed.equilibrium.solved_on_mesh()?;
+        event: &Crossing<F, N>,
+        stretch: &Stretch<D, F, N>,
+    ) -> Option<(Along<D, F, N>, Station<F, N>)> {
+        let solved: &Solved<D, F, N> = landed.equilibrium.solved_on_mesh()?;
         let mesh = Mesh::of(landed.equilibrium.problem(), &solved.program);
         let family = stretch.family.on(mesh);
         let continuation = family.continuation(self.pace);
@@ -277,7 +292,7 @@ impl Search<'_> {
     }
 
     /// Whether a branch from a station of a family is new and not one too many.
-    fn may_follow(&self, family: &Along, station: &Station) -> bool {
+    fn may_follow(&self, family: &Along<D, F, N>, station: &Station<F, N>) -> bool {
         !self.is_known(family, station)
             && self.diagram.branches.len() < self.diagram.settings.branches
     }
@@ -285,7 +300,12 @@ impl Search<'_> {
     /// The stations of other branches that cross at an event, a little before it or beyond.
     ///
     /// From beside the event a load along the vanishing mode leads over to these branches.
-    fn crossing(&mut self, event: &Crossing, before: &[Station], family: &Along) -> Vec<Station> {
+    fn crossing(
+        &mut self,
+        event: &Crossing<F, N>,
+        before: &[Station<F, N>],
+        family: &Along<D, F, N>,
+    ) -> Vec<Station<F, N>> {
         let settings = self.diagram.settings.crossings;
         match event.turn {
             Turn::Fold => return Vec::new(),
@@ -294,7 +314,7 @@ impl Search<'_> {
                 let mut found = settings.before.into_iter().map(|far| {
                     let before = before_by(far, event, before);
                     let others = self.beyond_modal_load(before, &event.mode, family);
-                    let is_other = |other: &Station| other.negative != before.negative;
+                    let is_other = |other: &Station<F, N>| other.negative != before.negative;
                     let others = others.into_iter().flatten().flatten().filter(is_other);
                     others.collect::<Vec<_>>()
                 });
@@ -309,8 +329,9 @@ impl Search<'_> {
                     continue;
                 };
                 let others = self.beyond_modal_load(&beside, &event.mode, family);
-                let near =
-                    |other: &Station| other.at.point.distance(&beside.at.point) < settings.near;
+                let near = |other: &Station<F, N>| {
+                    other.at.point.distance(&beside.at.point) < settings.near
+                };
                 found.extend(others.into_iter().flatten().flatten().filter(near));
             }
             if !found.is_empty() {
@@ -323,14 +344,15 @@ impl Search<'_> {
     /// The stations on other branches that are reached from a station, at its place, by a load along a mode and against it.
     fn beyond_modal_load(
         &mut self,
-        from: &Station,
-        mode: &stagewise::Mode<8>,
-        family: &Along,
-    ) -> Option<[Option<Station>; 2]> {
+        from: &Station<F, N>,
+        mode: &stagewise::Mode<N>,
+        family: &Along<D, F, N>,
+    ) -> Option<[Option<Station<F, N>>; 2]> {
         let Self {
             pace,
             proceed,
             diagram,
+            ..
         } = self;
         let continuation = family.continuation(*pace);
         let branch = diagram.branches.len();
@@ -346,7 +368,7 @@ impl Search<'_> {
 
     /// Directions in which to follow a branch from a station beside an event, as whether the parameter grows: away from the
     /// crossing; both ways at an apex, where the other branch goes straight through.
-    fn ways(&self, event: &Crossing, side: &Station) -> Vec<bool> {
+    fn ways(&self, event: &Crossing<F, N>, side: &Station<F, N>) -> Vec<bool> {
         let away = side.parameter > event.parameter;
         match event.turn {
             Turn::Apex => vec![true, false],
@@ -355,7 +377,7 @@ impl Search<'_> {
     }
 
     /// Whether one of the branches passes through a station of a family, by straight lines between their states.
-    fn is_known(&self, family: &Along, station: &Station) -> bool {
+    fn is_known(&self, family: &Along<D, F, N>, station: &Station<F, N>) -> bool {
         let settings = &self.diagram.settings.crossings;
         self.diagram.branches.iter().any(|branch| {
             let mut pairs = branch.states.windows(2);
@@ -364,16 +386,16 @@ impl Search<'_> {
     }
 
     /// The stations without duplicates: of two mirror images only the one that bulges more along `solver.bulge` is kept.
-    fn different(&self, stations: Vec<Station>) -> Vec<Station> {
+    fn different(&self, stations: Vec<Station<F, N>>) -> Vec<Station<F, N>> {
         let bulge = self.diagram.path.base().bulge();
-        let reach = |station: &Station| {
+        let reach = |station: &Station<F, N>| {
             let poses = station.at.point.poses.iter();
             let reach = poses.map(|pose| pose.position.dot(&bulge));
             reach.fold(f64::NEG_INFINITY, f64::max)
         };
-        let mut different: Vec<Station> = Vec::new();
+        let mut different: Vec<Station<F, N>> = Vec::new();
         for station in stations {
-            let is_image = |other: &&mut Station| {
+            let is_image = |other: &&mut Station<F, N>| {
                 are_images(&other.at.point.poses, &station.at.point.poses, SAME)
             };
             match different.iter_mut().find(is_image) {
@@ -388,14 +410,14 @@ impl Search<'_> {
     /// The minimum to which a belt led on past an event goes.
     fn landed(
         &mut self,
-        event: &Crossing,
-        crossing: &[Station],
-        before: Option<&Station>,
+        event: &Crossing<F, N>,
+        crossing: &[Station<F, N>],
+        before: Option<&Station<F, N>>,
         past: f64,
-        family: &Along,
+        family: &Along<D, F, N>,
     ) -> Option<Snapped> {
         let place = event.parameter + past;
-        let beyond = |station: &&Station| {
+        let beyond = |station: &&Station<F, N>| {
             station.negative == 0 && (station.parameter - event.parameter) * past > 0.0
         };
         let from = crossing.iter().find(beyond).unwrap_or(&event.station);
@@ -404,19 +426,24 @@ impl Search<'_> {
         let descended = family
             .continuation(self.pace)
             .descend(from, &event.mode, place, proceed);
-        let descended = descended.map(|found| of_solution(&problem, program, found));
+        let descended = descended.map(|found| D::of_solution(&problem, program, found));
         let others = match descended {
-            Some(_) => Some(solve_near(&problem, &family.mesh, &from.at.point, proceed)),
-            None => snapped_from(&problem, &family.mesh, &from.at.point, proceed),
+            Some(_) => Some(D::solve_near(
+                &problem,
+                &family.mesh,
+                &from.at.point,
+                proceed,
+            )),
+            None => snapped_from::<D, F, N>(&problem, &family.mesh, &from.at.point, proceed),
         };
         let distance = |found: &Equilibrium| {
-            let solved = found.solved_on_mesh();
+            let solved = found.solved_on_mesh::<D, F, N>();
             let point = &event.station.at.point;
             solved.map_or(f64::INFINITY, |solved| solved.at.point.distance(point))
         };
         let found = descended.into_iter().chain(others);
         let equilibrium = found.min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
-        let solved = equilibrium.solved_on_mesh()?;
+        let solved: &Solved<D, F, N> = equilibrium.solved_on_mesh()?;
         let objective = solved.values.objective;
         let rate = before.map_or(0.0, |before| {
             (event.station.objective - before.objective) / (event.parameter - before.parameter)
@@ -433,9 +460,9 @@ impl Search<'_> {
 }
 
 /// What is found at an event.
-struct Found {
+struct Found<const F: usize, const N: usize> {
     /// Stations of the branches that cross there.
-    crossing: Vec<Station>,
+    crossing: Vec<Station<F, N>>,
     /// The minimum on which the belt goes on where it loses its stability.
     landed: Option<Snapped>,
     /// Whether a finer mesh has the event.
@@ -443,14 +470,19 @@ struct Found {
 }
 
 /// The states of a stretch.
-fn states(stretch: &Stretch) -> impl Iterator<Item = State> {
+fn states<D: StripModel<F, N>, const F: usize, const N: usize>(
+    stretch: &Stretch<D, F, N>,
+) -> impl Iterator<Item = State> {
     let mesh = Arc::new(stretch.family.mesh.clone());
     let stations = stretch.stations.iter();
-    stations.map(move |station| State::of(station, Arc::clone(&mesh)))
+    stations.map(move |station| State::of::<D, F, N>(station, Arc::clone(&mesh)))
 }
 
 /// The end of a branch, given its last stretch: through the flat belt the branch would go over into its mirror image.
-fn without_mirror_image(last: &mut Stretch, end: End) -> End {
+fn without_mirror_image<D: StripModel<F, N>, const F: usize, const N: usize>(
+    last: &mut Stretch<D, F, N>,
+    end: End,
+) -> End {
     let reached = last.stations.last().map(|station| station.parameter);
     let is_open = matches!(end, End::Event | End::Lost);
     let is_near_limit = reached.is_some_and(|place| last.family.is_near_limit(place));
@@ -462,8 +494,12 @@ fn without_mirror_image(last: &mut Stretch, end: End) -> End {
 }
 
 /// The last station at a distance of at least `far` before an event, else the first.
-fn before_by<'a>(far: f64, event: &Crossing, stations: &'a [Station]) -> &'a Station {
-    let is_before = |station: &&Station| (station.parameter - event.parameter).abs() >= far;
+fn before_by<'a, const F: usize, const N: usize>(
+    far: f64,
+    event: &Crossing<F, N>,
+    stations: &'a [Station<F, N>],
+) -> &'a Station<F, N> {
+    let is_before = |station: &&Station<F, N>| (station.parameter - event.parameter).abs() >= far;
     stations
         .iter()
         .rev()
@@ -472,8 +508,11 @@ fn before_by<'a>(far: f64, event: &Crossing, stations: &'a [Station]) -> &'a Sta
 }
 
 /// The kind of an event, by the places of the crossing branches.
-fn kind(event: &Crossing, crossing: &[Station]) -> Kind {
-    let beyond = |station: &&Station| station.parameter > event.parameter;
+fn kind<const F: usize, const N: usize>(
+    event: &Crossing<F, N>,
+    crossing: &[Station<F, N>],
+) -> Kind {
+    let beyond = |station: &&Station<F, N>| station.parameter > event.parameter;
     match (event.turn, crossing.iter().filter(beyond).count()) {
         (Turn::Fold, _) => Kind::Fold,
         (Turn::Apex | Turn::Bifurcation, _) if crossing.is_empty() => Kind::Bifurcation,
@@ -484,9 +523,9 @@ fn kind(event: &Crossing, crossing: &[Station]) -> Kind {
 }
 
 /// Whether a station of a family lies between two states of a branch.
-fn lies_between(
-    family: &Along,
-    station: &Station,
+fn lies_between<D: StripModel<F, N>, const F: usize, const N: usize>(
+    family: &Along<D, F, N>,
+    station: &Station<F, N>,
     [a, b]: [&State; 2],
     settings: &CrossingSettings,
 ) -> bool {
@@ -508,10 +547,14 @@ fn lies_between(
 }
 
 /// The poses of a state at places of the spine, arc lengths in U; `None` where the state's mesh is none of the family's path.
-fn poses_at(family: &Along, state: &State, places: &[f64]) -> Option<Vec<Pose>> {
-    let poses = &state.at.point.poses;
+fn poses_at<D: StripModel<F, N>, const F: usize, const N: usize>(
+    family: &Along<D, F, N>,
+    state: &State,
+    places: &[f64],
+) -> Option<Vec<Pose>> {
+    let poses = state.at.poses();
     if *state.mesh == family.mesh {
-        return Some(poses.clone());
+        return Some(poses.to_vec());
     }
     let own = family.on((*state.mesh).clone()).at(state.place)?;
     Some(sampled(poses, &own.nodes(), places))

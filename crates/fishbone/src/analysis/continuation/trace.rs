@@ -2,12 +2,13 @@
 //! edges, and on another mesh wherever its own carries the shape no more.
 
 use crate::analysis::family::{Along, Station};
+use crate::equilibrium::model::StripModel;
 use crate::problem::program::BeltPoint;
 use stagewise::{Curve, Distance, End, Pace};
 use std::ops::ControlFlow;
 
 /// A place where the number of negative modes changes.
-pub(super) type Crossing = stagewise::Event<BeltPoint, 8>;
+pub(super) type Crossing<const F: usize, const N: usize> = stagewise::Event<BeltPoint<F>, N>;
 
 /// Largest displacement of a node on a switch to other active edges, in U: beyond, the switch leads to another branch.
 const SAME_SHAPE: f64 = 1e-3;
@@ -29,25 +30,25 @@ pub(super) enum Stop {
 }
 
 /// A part of a branch on one mesh with one active set of edges.
-pub(super) struct Stretch {
-    pub(super) family: Along,
+pub(super) struct Stretch<D, const F: usize, const N: usize> {
+    pub(super) family: Along<D, F, N>,
     /// Whether the ribs have come to other edges at its start.
     pub(super) has_other_edges: bool,
     /// Stations in order, those of events included.
-    pub(super) stations: Vec<Station>,
+    pub(super) stations: Vec<Station<F, N>>,
     /// Events in order, each with its index among the stations.
-    pub(super) events: Vec<(usize, Crossing)>,
+    pub(super) events: Vec<(usize, Crossing<F, N>)>,
 }
 
 /// Follows a branch from a station to its end, over at most as many stations as the pace says; gives its stretches, and the
 /// reason of its end.
-pub(super) fn trace(
-    family: &Along,
-    start: Station,
+pub(super) fn trace<D: StripModel<F, N>, const F: usize, const N: usize>(
+    family: &Along<D, F, N>,
+    start: Station<F, N>,
     pace: Pace,
-    proceed: &mut dyn FnMut(&Station) -> ControlFlow<()>,
-) -> (Vec<Stretch>, End<Stop>) {
-    let mut stretches: Vec<Stretch> = Vec::new();
+    proceed: &mut dyn FnMut(&Station<F, N>) -> ControlFlow<()>,
+) -> (Vec<Stretch<D, F, N>>, End<Stop>) {
+    let mut stretches: Vec<Stretch<D, F, N>> = Vec::new();
     let mut meshes = Meshes {
         begun: (family.clone(), start.clone()),
         left: MESHES,
@@ -129,25 +130,25 @@ pub(super) fn trace(
 }
 
 /// The meshes of a branch.
-struct Meshes {
+struct Meshes<D, const F: usize, const N: usize> {
     /// The first station of the branch, on the mesh of the present lengths of elements.
-    begun: (Along, Station),
+    begun: (Along<D, F, N>, Station<F, N>),
     /// Number of changes of the mesh that may follow.
     left: usize,
     /// Stations that are passed on a mesh before it has to carry them, a number.
     unwatched: usize,
 }
 
-impl Meshes {
+impl<D: StripModel<F, N>, const F: usize, const N: usize> Meshes<D, F, N> {
     /// The branch on a mesh that carries the station beyond, next to the last station that its own mesh carries; `None` where
     /// there is no such mesh, so that the branch has to go on on its own for a while.
     fn regraded(
         &mut self,
-        family: &Along,
-        last: &Station,
-        beyond: &Station,
+        family: &Along<D, F, N>,
+        last: &Station<F, N>,
+        beyond: &Station<F, N>,
         pace: Pace,
-    ) -> Option<(Along, Station)> {
+    ) -> Option<(Along<D, F, N>, Station<F, N>)> {
         /// Stations on a mesh that does not carry them before another one is tried, a number.
         const WHILE: usize = 10;
         self.left -= 1;
@@ -167,12 +168,12 @@ impl Meshes {
 }
 
 /// The branch on a mesh that carries the station beyond, next to another station.
-fn next_to(
-    family: &Along,
-    last: &Station,
-    beyond: &Station,
+fn next_to<D: StripModel<F, N>, const F: usize, const N: usize>(
+    family: &Along<D, F, N>,
+    last: &Station<F, N>,
+    beyond: &Station<F, N>,
     pace: Pace,
-) -> Option<(Along, Station)> {
+) -> Option<(Along<D, F, N>, Station<F, N>)> {
     let (other, start) = family.on_mesh_that_carries(beyond, last, pace)?;
     let here = family.shape_on(last, &other)?;
     let is_here = start.at.point.distance(&here) <= SAME_BELT;
@@ -186,13 +187,13 @@ fn next_to(
 ///
 /// Where two legs meet at an angle, the curve has a corner, and a step along its tangent misses the leg ahead. So the curve is
 /// followed up to there, and from there along its tangent on the leg ahead, in the same sense of the parameter.
-fn curve_over_legs(
-    family: &Along,
-    start: Station,
-    first: Option<&Station>,
+fn curve_over_legs<D: StripModel<F, N>, const F: usize, const N: usize>(
+    family: &Along<D, F, N>,
+    start: Station<F, N>,
+    first: Option<&Station<F, N>>,
     pace: Pace,
-    proceed: &mut dyn FnMut(&Station) -> ControlFlow<Stop>,
-) -> Curve<BeltPoint, Stop, 8> {
+    proceed: &mut dyn FnMut(&Station<F, N>) -> ControlFlow<Stop>,
+) -> Curve<BeltPoint<F>, Stop, N> {
     let mut first = first.cloned();
     let mut whole = Curve {
         stations: vec![start],
@@ -234,12 +235,12 @@ fn curve_over_legs(
 }
 
 /// The branch with other active edges next to its last station for which the present edges are right.
-fn switched(
-    family: &Along,
-    last: &Station,
-    beyond: &Station,
+fn switched<D: StripModel<F, N>, const F: usize, const N: usize>(
+    family: &Along<D, F, N>,
+    last: &Station<F, N>,
+    beyond: &Station<F, N>,
     pace: Pace,
-) -> Option<(Along, Station)> {
+) -> Option<(Along<D, F, N>, Station<F, N>)> {
     let mut shapes = [beyond, last].into_iter();
     shapes.find_map(|shape| {
         let other = family.with_active_sets_for(shape.parameter, &shape.at.point)?;

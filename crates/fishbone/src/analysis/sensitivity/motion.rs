@@ -3,12 +3,12 @@
 
 use super::Motion;
 use crate::geometry::Pose;
-use crate::problem::program::{DevelopableNode as NodeVector, NodeSupport, ROWS, Turn};
+use crate::problem::program::{NodeSupport, ROWS, Turn};
 use nalgebra::Vector3;
-use stagewise::Direction;
+use stagewise::{Direction, NodeVector};
 
 /// The motion of a node along the step of its state, a twist about the programme's origin.
-pub(super) fn motion(pose: &Pose, step: &NodeVector) -> Motion {
+pub(super) fn motion<const N: usize>(pose: &Pose, step: &NodeVector<N>) -> Motion {
     let rotation: Vector3<f64> = step.fixed_rows::<3>(3).into_owned();
     Motion {
         translation: step.fixed_rows::<3>(0) + rotation.cross(&pose.position),
@@ -18,11 +18,11 @@ pub(super) fn motion(pose: &Pose, step: &NodeVector) -> Motion {
 
 /// Adds the derivative by the state of a node whose derivatives by its motion are a force and a moment: the transpose of
 /// [`motion`].
-pub(super) fn add_generalised_force(
+pub(super) fn add_generalised_force<const N: usize>(
     pose: &Pose,
     force: &Vector3<f64>,
     moment: &Vector3<f64>,
-    into: &mut NodeVector,
+    into: &mut NodeVector<N>,
 ) {
     let mut by_displacement = into.fixed_rows_mut::<3>(0);
     by_displacement += force;
@@ -35,13 +35,13 @@ pub(super) fn add_generalised_force(
 /// A support's conditions depend on the turn from its frame to the node's alone. Let the support's frame turn by q and the
 /// node's by e: the turn changes by e − q − ½ q × e. So the mixed second derivative of multipliers times conditions is minus
 /// their second derivative by e, and −½ m · (q × e) with their moment m.
-pub(in crate::analysis) fn add_support_motion(
+pub(in crate::analysis) fn add_support_motion<const N: usize>(
     support: &NodeSupport,
     turn: &Turn,
     pose: &Pose,
     place: usize,
     motion: &Motion,
-    into: &mut Direction<8>,
+    into: &mut Direction<N>,
 ) {
     let rotation = &motion.rotation;
     let position = support.held(&motion.translation);
@@ -67,9 +67,9 @@ mod tests {
             frame: exp(&Vector3::new(0.4, -0.9, 0.3)),
             position: Vector3::new(0.1, 0.5, -0.2),
         };
-        let step = NodeVector::from_fn(|i, _| 0.3 * i as f64 - 0.8);
+        let step = NodeVector::<8>::from_fn(|i, _| 0.3 * i as f64 - 0.8);
         let (force, moment) = (Vector3::new(1.0, -2.0, 0.5), Vector3::new(0.3, 0.7, -1.1));
-        let mut generalised_force = NodeVector::zeros();
+        let mut generalised_force = NodeVector::<8>::zeros();
         add_generalised_force(&pose, &force, &moment, &mut generalised_force);
         let Motion {
             translation,

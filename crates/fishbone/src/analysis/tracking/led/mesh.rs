@@ -1,16 +1,14 @@
 //! The mesh of a tracker follows the error of its shape.
 
-use super::Tracker;
+use super::Led;
 use super::way::Way;
-use crate::equilibrium::{
-    Equilibrium, Solved, Status, carries, largest_change, mesh_that_carries, minimum_next_to_on,
-    prolonged, turns_too_far,
-};
+use crate::equilibrium::model::StripModel;
+use crate::equilibrium::{Equilibrium, Solved, Status, largest_change, turns_too_far};
 use crate::problem::Mesh;
 use stagewise::Distance;
 use std::ops::ControlFlow;
 
-impl Tracker {
+impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
     /// Goes on on another mesh where the present one carries the shape at the end of a way no more; not converged where elements
     /// turn too far for a belt.
     pub(super) fn follow_error(
@@ -24,7 +22,7 @@ impl Tracker {
         let change = largest_change(program, point);
         let is_far = turns_too_far(program, point);
         let has_changed = way.jump > 0.0 || change > GROWN * self.watched;
-        let is_watched = !self.is_slender && has_changed;
+        let is_watched = !self.is_graded_anew && has_changed;
         if !is_far && !is_watched {
             return Status::Converged;
         }
@@ -54,17 +52,17 @@ impl Tracker {
         let problem = self.problem_at(&self.pose).ok()?;
         let at = self.follower.solution().at;
         let (own, objective) = (self.follower.program(), self.follower.values().objective);
-        if carries(&problem, own, &at, objective) {
+        if D::carries(&problem, own, &at, objective) {
             return None;
         }
-        let mesh = mesh_that_carries(&problem, own, &at)?;
-        let mut program = problem.program_on(&mesh)?;
-        let shape = prolonged(own, &at.point, &program);
-        problem.choose_active_sets(&mut program, &shape);
+        let mesh = D::mesh_that_carries(&problem, own, &at)?;
+        let mut program = D::program_on(&problem, &mesh)?;
+        let shape = D::prolonged(own, &at.point, &program);
+        D::choose_active_sets(&problem, &mut program, &shape);
         let mesh = Mesh::of(&problem, &program);
-        let found = minimum_next_to_on(&problem, &mesh, &shape, proceed);
+        let found = D::minimum_next_to(&problem, &mesh, &shape, proceed);
         way.iterations += found.iterations;
-        let is_here = |solved: &Solved| solved.at.point.distance(&shape) <= SAME_BELT;
+        let is_here = |solved: &Solved<D, F, N>| solved.at.point.distance(&shape) <= SAME_BELT;
         found.certified().is_ok_and(is_here).then_some(found)
     }
 }

@@ -4,6 +4,8 @@
 //! lower than the right one. A strong gauge has none of them. So the search takes the developable shape with its rib slopes
 //! smoothed, finds the minimum with the strong gauge, and follows it to the weak one.
 
+mod model;
+
 use super::accuracy::{MeshError, Quantities};
 use super::intrinsic;
 use super::judged::Judged;
@@ -62,11 +64,11 @@ pub(crate) fn next_to(problem: &Problem, found: Equilibrium, proceed: &mut Proce
     let from_start = |mesh: &Mesh, proceed: &mut Proceed| {
         let bare = problem.program_on(mesh)?;
         let shape = search::prolonged(&start.program, &start.at.point, &bare);
-        let (program, solution) = from_developable(&bare, &shape, problem.tolerance(), proceed);
-        Some((bare, program, solution))
+        let (program, solution) = from_developable(problem, &bare, &shape, proceed);
+        Some((program, solution))
     };
     let mesh = Mesh::uniform(problem, problem.elements());
-    let (bare, mut program, mut solution) =
+    let (mut program, mut solution) =
         from_start(&mesh, proceed).expect("a division for every stretch");
     let mut iterations = found.iterations + solution.iterations;
     let mut error = OnceLock::new();
@@ -76,7 +78,7 @@ pub(crate) fn next_to(problem: &Problem, found: Equilibrium, proceed: &mut Proce
         }
         let finer = halved(problem, &program, &solution, proceed).or_else(|| {
             let mesh = Mesh::of(problem, &program).halved();
-            let (_, program, solution) = from_start(&mesh, proceed)?;
+            let (program, solution) = from_start(&mesh, proceed)?;
             (solution.outcome == Outcome::Converged).then_some((program, solution))
         });
         let Some((finer, better)) = finer else {
@@ -94,21 +96,31 @@ pub(crate) fn next_to(problem: &Problem, found: Equilibrium, proceed: &mut Proce
         error = OnceLock::from(Some(known.times(0.5)).filter(MeshError::is_finite));
         (program, solution) = (finer, better);
     }
-    let redundant = intrinsic::redundant(problem, &bare);
-    let fault = hides_energy(problem, &program, &solution).then(|| HIDDEN.to_owned());
     solution.iterations = iterations;
+    Equilibrium {
+        error,
+        ..judged(problem, program, solution)
+    }
+}
+
+/// The equilibrium of a solution of a problem's programme, which has converged only if no energy hides from its mesh.
+fn judged(problem: &Problem, program: ShellProgram, solution: ShellSolution) -> Equilibrium {
+    // Which constraints follow from others does not depend on the energy.
+    let redundant = intrinsic::redundant(problem, &problem.program(problem.elements()));
+    let is_hiding = hides_energy(problem, &program, &solution);
+    let fault = is_hiding.then(|| HIDDEN.to_owned());
     let (status, message) =
         intrinsic::judge(problem, &program, &solution, fault, redundant.as_deref());
     let judged = Judged {
         stability: stability(problem, &program, &solution, status),
+        is_of_mesh_alone: is_hiding && solution.outcome == Outcome::Converged,
         program,
         solution,
         status,
         message,
         redundant,
         is_flat: false,
-        is_of_mesh_alone: false,
-        error,
+        error: OnceLock::new(),
     };
     judged.equilibrium(problem, |solved| AnySolved::Shell(Box::new(solved)))
 }
@@ -169,7 +181,7 @@ fn halved(
     }
     let settings = Settings {
         iterations: FEW,
-        ..settings(tolerance, BARRIERS[1])
+        ..settings(problem, BARRIERS[1])
     };
     let found = stagewise::minimise(&finer, &settings, near.point.clone(), proceed);
     let is_found = found.outcome == Outcome::Converged && is_next(&found);
@@ -296,9 +308,10 @@ fn stability(
     Some(inertia?.into())
 }
 
-fn settings(tolerance: f64, barrier: f64) -> Settings {
+/// Settings of a search with a first barrier, in mean R_f/U.
+fn settings(problem: &Problem, barrier: f64) -> Settings {
     Settings {
-        tolerance,
+        tolerance: problem.tolerance(),
         iterations: MinimumSettings::default().iterations,
         barrier,
         longest_step: f64::INFINITY,
@@ -307,24 +320,19 @@ fn settings(tolerance: f64, barrier: f64) -> Settings {
 
 /// The minimum of a strip of finite thickness next to the shape of a developable one, on its mesh.
 fn from_developable(
+    problem: &Problem,
     developable: &BeltProgram,
     shape: &BeltPoint,
-    tolerance: f64,
     proceed: &mut Proceed,
 ) -> (ShellProgram, ShellSolution) {
     let [strong, weak] = GAUGES.map(|gauge| developable.as_shell(Shell::new(gauge, POINTS)));
-    let start = start(&strong, shape);
-    let first = stagewise::minimise(&strong, &settings(tolerance, BARRIERS[0]), start, proceed);
+    let [wide, narrow] = BARRIERS.map(|barrier| settings(problem, barrier));
+    let first = stagewise::minimise(&strong, &wide, start(&strong, shape), proceed);
     let iterations = first.iterations;
     if first.outcome != Outcome::Converged {
         return (strong, first);
     }
-    let found = stagewise::minimise(
-        &weak,
-        &settings(tolerance, BARRIERS[1]),
-        first.at.point,
-        proceed,
-    );
+    let found = stagewise::minimise(&weak, &narrow, first.at.point, proceed);
     (weak, found.after(iterations))
 }
 
