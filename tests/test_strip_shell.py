@@ -233,15 +233,6 @@ def test_thickness_is_needed_and_given_once() -> None:
         fb.Scenario.from_dict(twice)
 
 
-def test_what_knows_developable_belts_only_says_so() -> None:
-    belt = solve(thick(example1(elements=80)))
-    with pytest.raises(fb.NoSensitivity, match="wunderlich") as sensitivity:
-        belt.sensitivity()
-    with pytest.raises(fb.NoTracker, match="wunderlich") as tracker:
-        fb.Tracker(belt.scenario)
-    assert (sensitivity.value.reason, tracker.value.reason) == ("shell", "shell")
-
-
 def test_coarse_mesh_is_warned_of() -> None:
     """A fixed mesh of elements longer than V/8, and one whose error is above the accuracy."""
     long = solve(thick(example1(elements=40)))

@@ -178,7 +178,7 @@ class Sensitivity:
     @property
     def shape(self) -> tuple[int, int, int]: ...
     def forward(
-        self, supports: _Floats, rigidity: _Floats, natural_bend: _Floats, width: float, gravity: _Row
+        self, supports: _Floats, rigidity: _Floats, natural_bend: _Floats, sheet: _Row, gravity: _Row
     ) -> tuple[_Floats, _Floats, _Floats, _Floats, _Floats, float]: ...
     def adjoint(
         self,
@@ -188,7 +188,7 @@ class Sensitivity:
         rib_slope: _Floats,
         reactions: _Floats,
         energy: float,
-    ) -> tuple[_Floats, _Floats, _Floats, float, _Row]: ...
+    ) -> tuple[_Floats, _Floats, _Floats, _Row, _Row]: ...
     def jacobian(self, support: int) -> _Floats: ...
 
 @final

@@ -54,6 +54,11 @@ class Gradient:
     """By the natural bend of every segment of the belt, shape (segments,)."""
     width: float
     """By the width, at constant rigidity and mass of the whole width."""
+    thickness: float
+    """By the thickness, at constant rigidity and mass; of `layers`, by that of the sheet whose stretching stiffness is
+    to its bending stiffness as theirs. 0 unless the energy is "shell"."""
+    poisson: float
+    """By Poisson's ratio, at constant rigidity. 0 of a belt without natural bend unless the energy is "shell"."""
     gravity: Floats
     """By gravity, shape (3,)."""
 
@@ -71,31 +76,35 @@ class Sensitivity:
     def __init__(self, inner: _core.Sensitivity) -> None:
         self._inner = inner
 
-    def forward(
+    def forward(  # noqa: PLR0913, PLR0917
         self,
         supports: npt.ArrayLike | None = None,
         rigidity: npt.ArrayLike | None = None,
         natural_bend: npt.ArrayLike | None = None,
         width: float = 0.0,
         gravity: npt.ArrayLike | None = None,
+        thickness: float = 0.0,
+        poisson: float = 0.0,
     ) -> Change:
         """The change of the equilibrium along a direction of its parameters.
 
         `supports` holds [translation, left world-axes rotation about the support point] of every support; components
         that are free change nothing. `rigidity` is the change of R_f at the nodes, linear in between. `width` changes
-        the width alone. For a belt given by its material the rigidity and the mass change with the width: add
-        `rigidity = R_f/V` and `gravity = g/V` for `width = 1`.
+        the width alone, `thickness` and `poisson` each its own number alone. For a belt given by its material the
+        rigidity and the mass change with the width: add `rigidity = R_f/V` and `gravity = g/V` for `width = 1`. They
+        change with the thickness h, too: add `rigidity = 3 R_f/h` and `gravity = g/h` for `thickness = 1`.
 
         Shapes: supports (m, 6), rigidity (n,), natural_bend (segments,), gravity (3,); None is no change.
         Errors: `InvalidArgument` for other shapes and for numbers that are not finite; `NoSensitivity` where the
         supports leave the belt no slack for the change.
         """
         m, n, segments = self._inner.shape
+        sheet = (("width", width), ("thickness", thickness), ("poisson", poisson))
         arguments = (
             _array("supports", supports, (m, 6)),
             _array("rigidity", rigidity, (n,)),
             _array("natural_bend", natural_bend, (segments,)),
-            float(_array("width", width, ())),
+            [float(_array(name, value, ())) for name, value in sheet],
             _array("gravity", gravity, (3,)).tolist(),
         )
         return Change(*self._inner.forward(*arguments))
@@ -126,8 +135,8 @@ class Sensitivity:
             _array("reactions", reactions, (m, 6)),
             float(_array("energy", energy, ())),
         )
-        supports, rigidity, natural_bend, width, gravity = self._inner.adjoint(*arguments)
-        return Gradient(supports, rigidity, natural_bend, width, np.array(gravity))
+        supports, rigidity, natural_bend, sheet, gravity = self._inner.adjoint(*arguments)
+        return Gradient(supports, rigidity, natural_bend, *sheet, np.array(gravity))
 
     def jacobian(self, support: int) -> Floats:
         """Derivatives of the spine positions by the motion of a support, which is named by its index.

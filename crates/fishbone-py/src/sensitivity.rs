@@ -10,6 +10,9 @@ use numpy::{IntoPyArray, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use std::sync::{Mutex, PoisonError};
 
+/// Derivatives by supports, rigidity, natural bend, [width, thickness, Poisson's ratio], gravity.
+type Gradient<'py> = (Points<'py>, Scalars<'py>, Scalars<'py>, [f64; 3], [f64; 3]);
+
 /// The factorised first-order conditions of an equilibrium.
 ///
 /// Errors: `NoSensitivity` if the supports cannot make a motion.
@@ -50,14 +53,16 @@ impl Sensitivity {
 
     /// (position, rotation, bend, `rib_slope`, reactions, energy).
     ///
-    /// Shapes: (m, 6), (n,), (segments,), 1, (3,) to (n, 3), (n, 3), (n,), (n,), (m, 6), 1.
+    /// The last but one are width, thickness and Poisson's ratio.
+    ///
+    /// Shapes: (m, 6), (n,), (segments,), (3,), (3,) to (n, 3), (n, 3), (n,), (n,), (m, 6), 1.
     fn forward<'py>(
         &self,
         py: Python<'py>,
         supports: PyReadonlyArray2<'py, f64>,
         rigidity: PyReadonlyArray1<'py, f64>,
         natural_bend: PyReadonlyArray1<'py, f64>,
-        width: f64,
+        sheet: [f64; 3],
         gravity: [f64; 3],
     ) -> PyResult<(
         Points<'py>,
@@ -68,6 +73,7 @@ impl Sensitivity {
         f64,
     )> {
         let supports = halves(supports.as_array());
+        let [width, thickness, poisson] = sheet;
         let parameters = Parameters {
             supports: supports
                 .map(|[translation, rotation]| Motion {
@@ -78,6 +84,8 @@ impl Sensitivity {
             rigidity: rigidity.as_array().to_vec(),
             natural_bend: natural_bend.as_array().to_vec(),
             width,
+            thickness,
+            poisson,
             gravity: gravity.into(),
         };
         let change = self.with(py, |inner| inner.forward(&parameters))?;
@@ -92,7 +100,7 @@ impl Sensitivity {
         ))
     }
 
-    /// (supports, rigidity, `natural_bend`, width, gravity).
+    /// (supports, rigidity, `natural_bend`, [width, thickness, Poisson's ratio], gravity).
     ///
     /// Shapes: those of `forward`, the other way round.
     #[expect(clippy::too_many_arguments, reason = "one each that may change")]
@@ -105,7 +113,7 @@ impl Sensitivity {
         rib_slope: PyReadonlyArray1<'py, f64>,
         reactions: PyReadonlyArray2<'py, f64>,
         energy: f64,
-    ) -> PyResult<(Points<'py>, Scalars<'py>, Scalars<'py>, f64, [f64; 3])> {
+    ) -> PyResult<Gradient<'py>> {
         let reactions = halves(reactions.as_array());
         let by = Change {
             position: vectors(position.as_array()),
@@ -123,7 +131,7 @@ impl Sensitivity {
             array::doubles(py, supports.map(|by| [by.translation, by.rotation])),
             gradient.rigidity.into_pyarray(py),
             gradient.natural_bend.into_pyarray(py),
-            gradient.width,
+            [gradient.width, gradient.thickness, gradient.poisson],
             array::row(&gradient.gravity),
         ))
     }

@@ -5,18 +5,20 @@
 //! back-substitution carries a change of p to the change of x, and one carries a derivative by x back to p.
 
 mod data;
+mod linearised;
 mod motion;
 mod scales;
 mod system;
 
-use crate::equilibrium::{Equilibrium, Uncertified};
+use crate::equilibrium::{AnySolved, Equilibrium, Uncertified};
 use crate::geometry::Wrench;
 use crate::names::named;
+use crate::strip::developable::DevelopableEnergy;
+use crate::strip::shell::{FIELDS, Shell};
+use linearised::Linearised;
 pub(super) use motion::add_support_motion;
 use nalgebra::{Matrix3x6, Vector3};
 use scales::Scales;
-use stagewise::{Response, Singular};
-use system::{Direction, System};
 use thiserror::Error;
 
 /// A small motion in world axes, its rotation left and about the point that moves; or a derivative by one.
@@ -30,7 +32,8 @@ pub struct Motion {
 
 /// A change of the data of an equilibrium's problem, in the units of its scenario; or a derivative by such a change.
 ///
-/// All other data are held fixed: mass and rigidity do not change with the width, and the mesh never changes.
+/// All other data are held fixed: mass and rigidity do not change with width, thickness and Poisson's ratio, and the mesh never
+/// changes.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Parameters {
     /// Motion of every support, in the order of the scenario.
@@ -41,6 +44,10 @@ pub struct Parameters {
     pub natural_bend: Vec<f64>,
     /// Width V.
     pub width: f64,
+    /// Thickness h of the sheet; of layers, that of the sheet of as much stretching stiffness over rigidity.
+    pub thickness: f64,
+    /// Poisson's ratio ν.
+    pub poisson: f64,
     /// Gravity.
     pub gravity: Vector3<f64>,
 }
@@ -99,16 +106,25 @@ named!(impl NoSensitivity {
     ..Uncertified,
 });
 
-/// A vector of the first-order conditions.
-type Step = stagewise::Direction<8>;
-
 /// The factorised first-order conditions of an equilibrium.
 #[derive(Debug)]
-pub struct Sensitivity {
-    response: Response<6, 2, 8>,
-    system: System,
-    scales: Scales,
-    nodes: usize,
+pub struct Sensitivity(AnyLinearised);
+
+/// Those of either model of the strip.
+#[derive(Debug)]
+enum AnyLinearised {
+    Developable(Box<Linearised<DevelopableEnergy, 2, 8>>),
+    Shell(Box<Linearised<Shell, FIELDS, 12>>),
+}
+
+/// The value of an expression of the linearised conditions, of whichever model.
+macro_rules! of_linearised {
+    ($any:expr, $linearised:ident => $value:expr) => {
+        match $any {
+            AnyLinearised::Developable($linearised) => $value,
+            AnyLinearised::Shell($linearised) => $value,
+        }
+    };
 }
 
 impl Equilibrium {
@@ -118,76 +134,45 @@ impl Equilibrium {
     ///
     /// [`NoSensitivity`] unless it is a strict minimum that its supports determine.
     pub fn sensitivity(&self) -> Result<Sensitivity, NoSensitivity> {
-        let solved = self.certified()?;
-        if let Some(names) = &solved.redundant {
-            return Err(NoSensitivity::Redundant(names.clone()));
-        }
-        if solved.inertia.is_some_and(|inertia| inertia.negative > 0) {
-            return Err(NoSensitivity::Saddle);
-        }
-        if self.problem.has_no_slack() {
-            return Err(NoSensitivity::NoSlack);
-        }
-        if solved.is_flat {
-            return Err(NoSensitivity::Flat);
-        }
-        let response = Response::of_minimum(&solved.program, &mut solved.at.clone());
-        let mut sensitivity = Sensitivity {
-            response: response.map_err(|Singular| NoSensitivity::Marginal)?,
-            system: System::new(solved),
-            scales: Scales::new(&self.problem, &solved.program),
-            nodes: solved.at.point.poses.len(),
+        let linearised = match self.certified_any()? {
+            AnySolved::Developable(solved) => {
+                AnyLinearised::Developable(Box::new(Linearised::of(self, solved)?))
+            }
+            AnySolved::Shell(solved) => {
+                AnyLinearised::Shell(Box::new(Linearised::of(self, solved)?))
+            }
         };
-        let is_strict = solved
-            .inertia
-            .is_some_and(|inertia| inertia.zero + inertia.symmetries == 0);
-        match is_strict || sensitivity.is_held() {
-            true => Ok(sensitivity),
-            false => Err(NoSensitivity::Marginal),
-        }
+        Ok(Sensitivity(linearised))
     }
 }
 
 impl Sensitivity {
     /// Number of nodes.
     pub fn nodes(&self) -> usize {
-        self.nodes
+        of_linearised!(&self.0, linearised => linearised.nodes)
     }
 
     /// Number of supports.
     pub fn supports(&self) -> usize {
-        self.scales.supports()
+        self.scales().supports()
     }
 
     /// Number of segments of the belt.
     pub fn segments(&self) -> usize {
-        self.scales.segments()
+        self.scales().segments()
+    }
+
+    fn scales(&self) -> &Scales {
+        of_linearised!(&self.0, linearised => &linearised.scales)
     }
 
     /// No change of any parameter.
     pub(crate) fn no_parameters(&self) -> Parameters {
         Parameters {
             supports: vec![Motion::default(); self.supports()],
-            rigidity: vec![0.0; self.nodes],
+            rigidity: vec![0.0; self.nodes()],
             natural_bend: vec![0.0; self.segments()],
             ..Parameters::default()
-        }
-    }
-
-    /// No change of the equilibrium.
-    pub(crate) fn no_change(&self) -> Change {
-        let nothing = Vector3::zeros();
-        let no_wrench = Wrench {
-            force: nothing,
-            moment: nothing,
-        };
-        Change {
-            position: vec![nothing; self.nodes],
-            rotation: vec![nothing; self.nodes],
-            bend: vec![0.0; self.nodes],
-            rib_slope: vec![0.0; self.nodes],
-            reactions: vec![no_wrench; self.supports()],
-            energy: 0.0,
         }
     }
 
@@ -197,30 +182,7 @@ impl Sensitivity {
     ///
     /// [`NoSensitivity::NoSlack`] where the supports cannot make this motion.
     pub fn forward(&mut self, parameters: &Parameters) -> Result<Change, NoSensitivity> {
-        let direction = self.scales.to_program(parameters, &self.system);
-        let mut right = self.response.zero();
-        self.system.add_change(&direction, &mut right);
-        let solution = self.solve(&right)?;
-        let units = self.scales.units;
-        let mut change = self.no_change();
-        for k in 0..self.nodes {
-            let motion = self.system.motion(k, &solution.nodes);
-            change.position[k] = motion.translation * units.length;
-            change.rotation[k] = motion.rotation;
-            change.bend[k] = solution.nodes[k][6] / units.length;
-            change.rib_slope[k] = solution.nodes[k][7];
-        }
-        let responses = self.system.response(&solution).supports;
-        for (i, reaction) in change.reactions.iter_mut().enumerate() {
-            let own = self.system.own_moment(i, &direction.supports[i].rotation);
-            *reaction = Wrench {
-                force: responses[i].translation * units.force(),
-                moment: (responses[i].rotation + own) * units.energy,
-            };
-        }
-        change.energy = self.system.by_change().dot(&direction) * units.energy
-            + self.scales.origin_by_gravity.dot(&parameters.gravity);
-        Ok(change)
+        of_linearised!(&mut self.0, linearised => linearised.forward(parameters))
     }
 
     /// Derivative by the parameters of a function that has given derivatives by the equilibrium: the transpose of
@@ -230,32 +192,7 @@ impl Sensitivity {
     ///
     /// [`NoSensitivity::NoSlack`] where the supports cannot move each by itself.
     pub fn adjoint(&mut self, by: &Change) -> Result<Parameters, NoSensitivity> {
-        let units = self.scales.units;
-        let mut direction = self.system.unchanged();
-        for (motion, by_reaction) in direction.supports.iter_mut().zip(&by.reactions) {
-            *motion = Motion {
-                translation: by_reaction.force * units.force(),
-                rotation: by_reaction.moment * units.energy,
-            };
-        }
-        let mut right = self.response.zero();
-        self.system.add_change(&direction, &mut right);
-        for k in 0..self.nodes {
-            let force = by.position[k] * units.length;
-            self.system
-                .add_generalised_force(k, &force, &by.rotation[k], &mut right.nodes);
-            right.nodes[k][6] += by.bend[k] / units.length;
-            right.nodes[k][7] += by.rib_slope[k];
-        }
-        let solution = self.solve(&right)?;
-        let mut gradient = self.system.response(&solution);
-        for (i, by_reaction) in direction.supports.iter().enumerate() {
-            gradient.supports[i].rotation += self.system.by_own_moment(i, &by_reaction.rotation);
-        }
-        gradient.add(by.energy * units.energy, &self.system.by_change());
-        let mut parameters = self.scales.to_scenario(&gradient, self.nodes);
-        parameters.gravity += by.energy * self.scales.origin_by_gravity;
-        Ok(parameters)
+        of_linearised!(&mut self.0, linearised => linearised.adjoint(by))
     }
 
     /// Derivative of the spine's positions by the motion of a support, at every node by [translation, rotation].
@@ -268,7 +205,7 @@ impl Sensitivity {
     ///
     /// If there is no such support.
     pub fn jacobian(&mut self, support: usize) -> Result<Vec<Matrix3x6<f64>>, NoSensitivity> {
-        let mut jacobian = vec![Matrix3x6::zeros(); self.nodes];
+        let mut jacobian = vec![Matrix3x6::zeros(); self.nodes()];
         for column in 0..6 {
             let mut parameters = self.no_parameters();
             let motion = &mut parameters.supports[support];
@@ -283,33 +220,6 @@ impl Sensitivity {
         }
         Ok(jacobian)
     }
-
-    /// Whether no node moves far under unit loads, so that no compliance is infinite. Where the belt does not bend, the
-    /// slope of its ribs costs nothing, but moves no node either.
-    fn is_held(&mut self) -> bool {
-        /// Displacement under unit loads from which the belt counts as free to move, in U.
-        const FAR: f64 = 1e6;
-        let mut right = self.response.zero();
-        for k in 0..self.nodes {
-            let in_general =
-                |seed: f64| Vector3::new(1.0, 2.0, 3.0).map(|i| (i * k as f64 + seed).sin());
-            let [force, moment] = [1.0, 2.0].map(|seed| in_general(seed) / self.nodes as f64);
-            self.system
-                .add_generalised_force(k, &force, &moment, &mut right.nodes);
-        }
-        self.response.solve(&right).is_ok_and(|solution| {
-            let motions = (0..self.nodes).map(|k| self.system.motion(k, &solution.nodes));
-            motions.fold(0.0, |most, motion| {
-                f64::max(most, motion.translation.amax())
-            }) < FAR
-        })
-    }
-
-    fn solve(&mut self, right: &Step) -> Result<Step, NoSensitivity> {
-        self.response
-            .solve(right)
-            .map_err(|Singular| NoSensitivity::NoSlack)
-    }
 }
 
 impl Motion {
@@ -320,25 +230,5 @@ impl Motion {
 
     fn dot(&self, other: &Self) -> f64 {
         self.translation.dot(&other.translation) + self.rotation.dot(&other.rotation)
-    }
-}
-
-impl Direction {
-    fn add(&mut self, factor: f64, other: &Self) {
-        for (own, other) in self.supports.iter_mut().zip(&other.supports) {
-            own.add(factor, other);
-        }
-        for (own, other) in self.elements.iter_mut().zip(&other.elements) {
-            *own += factor * other;
-        }
-        self.weight += factor * other.weight;
-    }
-
-    fn dot(&self, other: &Self) -> f64 {
-        let supports = self.supports.iter().zip(&other.supports);
-        let elements = self.elements.iter().zip(&other.elements);
-        supports.map(|(a, b)| a.dot(b)).sum::<f64>()
-            + elements.map(|(a, b)| a.dot(b)).sum::<f64>()
-            + self.weight.dot(&other.weight)
     }
 }

@@ -36,9 +36,6 @@ use nalgebra::{Rotation3, SVector, UnitQuaternion, Vector3, Vector6};
 use num_dual::DualNum;
 use stagewise::{Distance, NodeVector};
 
-/// Unknowns of a node of a developable belt: a twist of the pose in world axes about the origin, then bend and rib slope.
-pub(crate) type DevelopableNode = NodeVector<8>;
-
 /// Rows of the conditions of one support or link, a number.
 pub(crate) const ROWS: usize = 6;
 /// Values or multipliers of the conditions of one support or link; unused rows are zero.

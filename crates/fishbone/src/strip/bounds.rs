@@ -87,6 +87,33 @@ impl<W: DualNum<Primitive = f64> + Copy> Edge<W> {
     }
 }
 
+/// The active edges of a board of a larger half width.
+///
+/// The edges of the board are half a width off its spine. Where they end on another edge does not matter but for the
+/// last tangent of an arc, which is kept.
+pub(crate) fn moved_out<D: DualNum<Primitive = f64> + Copy>(
+    edges: &ActiveEdges,
+    more: D,
+) -> ActiveEdges<D> {
+    let moved = |edge: &Edge, side: f64| Edge {
+        direction: edge.direction,
+        distance: more * side + edge.distance,
+        curvature: match edge.curvature == 0.0 {
+            true => D::zero(),
+            // Active edges that curve are inner ones: the wider the belt, the less their radius.
+            false => (more * -side + 1.0 / edge.curvature).recip(),
+        },
+        turn: edge.turn,
+    };
+    let [minus, plus, own] = edges;
+    [
+        minus.as_ref().map(|edge| moved(edge, -1.0)),
+        plus.as_ref().map(|edge| moved(edge, 1.0)),
+        own.as_ref()
+            .map(|edge| moved(edge, edge.curvature.signum())),
+    ]
+}
+
 /// The inequalities of one element.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct RibBounds<'a, W = f64> {
@@ -153,7 +180,9 @@ impl RibBounds<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use num_dual::{Dual2SVec64, hessian};
+    use crate::board::reach::edges_in_reach;
+    use crate::board::samples::{Part, Plan};
+    use num_dual::{Dual2SVec64, Dual64, hessian};
 
     fn bounds(geodesic: f64) -> RibBounds<'static> {
         let strips = Strips {
@@ -237,5 +266,37 @@ mod tests {
         let [slope, s] = variables([0.0, 4.0]);
         let jet = SlopeJet::from(edge.slack(slope, s));
         assert!((jet.value - 0.8).abs() < 1e-15 && jet.gradient.amax().is_finite());
+    }
+
+    #[test]
+    fn test_active_edges_move_with_the_width_as_those_of_the_board_do() {
+        let leg = Part::Straight(0.4);
+        let parts = [leg, Part::Corner(1.0), leg, Part::Arc(0.2, 4.0), leg];
+        let mirrored = [leg, Part::Corner(-1.0), leg, Part::Arc(0.2, -4.0), leg];
+        let step = 1e-6;
+        let mut seen = [0, 0];
+        for parts in [parts, mirrored] {
+            let mut spine = Plan::open(0.1, &parts).spine();
+            let mut of_width = |width: f64| {
+                spine.width = width;
+                edges_in_reach(&spine)
+            };
+            let [below, at, above] = [-step, 0.0, step].map(|by| of_width(0.1 + 2.0 * by));
+            for ((below, at), above) in below.iter().zip(&at).zip(&above) {
+                let wider = moved_out(&at.1, Dual64::from(0.0).derivative());
+                for (i, edge) in wider.iter().enumerate() {
+                    let (Some(edge), Some(below), Some(above)) = (edge, below.1[i], above.1[i])
+                    else {
+                        continue;
+                    };
+                    let distance = (above.distance - below.distance) / (2.0 * step);
+                    assert!((edge.distance.eps - distance).abs() < 1e-6, "{edge:?}");
+                    let curvature = (above.curvature - below.curvature) / (2.0 * step);
+                    assert!((edge.curvature.eps - curvature).abs() < 1e-4, "{edge:?}");
+                    seen[usize::from(edge.curvature.re != 0.0)] += 1;
+                }
+            }
+        }
+        assert!(seen.iter().all(|count| *count >= 8), "{seen:?}");
     }
 }

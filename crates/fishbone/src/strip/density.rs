@@ -5,8 +5,8 @@
 //! energy is taken at the element's two Gauss points. The pose increment is always taken there.
 
 use crate::geometry::Pose;
-use crate::strip::bounds::{ACTIVE, Edge};
-use crate::strip::element::{Curl, Element};
+use crate::strip::bounds::{ACTIVE, Edge, RibBounds, moved_out};
+use crate::strip::element::{Element, Stock};
 use nalgebra::{SMatrix, SVector, Vector6};
 use num_dual::DualNum;
 use stagewise::{Stage, StageMatrix};
@@ -29,8 +29,10 @@ pub struct Section<'a, T, const F: usize> {
     pub rates: [T; F],
     /// Fields at both ends of the element.
     pub ends: [[T; F]; 2],
-    /// The element: its length, in-plane curvature, half width.
+    /// The element: its length and in-plane curvature.
     pub element: &'a Element,
+    /// What the element is made of.
+    pub stock: Stock<T>,
 }
 
 /// The rib slope beyond a bend of the board by χ; `None` where the rib would leave through the bend: a rib there is one
@@ -76,6 +78,7 @@ pub trait Density<const F: usize>: Clone {
             rates: std::array::from_fn(|i| (ends[1][i] - ends[0][i]) / element.length),
             ends,
             element,
+            stock: element.stock().map(T::from),
         }
     }
 
@@ -179,6 +182,22 @@ pub trait Density<const F: usize>: Clone {
         }
     }
 
+    /// As [`Self::slacks`], of a belt of a half width; the numbers may carry derivatives.
+    fn slacks_of_width<T: DualNum<Primitive = f64> + Copy>(
+        &self,
+        element: &Element,
+        edges: &[Option<Edge>; ACTIVE],
+        ends: &[[T; F]; 2],
+        half_width: T,
+    ) -> Vec<T> {
+        let bounds = RibBounds {
+            strips: element.strips_of(half_width),
+            edges: &moved_out(edges, half_width - element.half_width),
+        };
+        let slacks = bounds.slacks([ends[0][1], ends[1][1]]);
+        bounds.places().map(|place| slacks[place]).collect()
+    }
+
     /// Energy of an element, from its fields at both ends.
     fn energy(&self, element: &Element, ends: [&SVector<f64, F>; 2]) -> f64 {
         element_energy(self, element, ends.map(|end| end.data.0[0]))
@@ -256,11 +275,4 @@ where
     };
     let places = density.places().iter();
     places.map(at).fold(T::zero(), |sum, part| sum + part)
-}
-
-impl<T: DualNum<Primitive = f64> + Copy, const F: usize> Section<'_, T, F> {
-    /// Natural bend of the element.
-    pub(crate) fn curl(&self) -> &Curl {
-        &self.element.curl
-    }
 }

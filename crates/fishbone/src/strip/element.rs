@@ -54,7 +54,32 @@ pub struct Curl<W = f64> {
     /// Natural bend k, the ω_ζ of the unloaded belt.
     pub bend: W,
     /// Poisson's ratio ν: bending along the curl bends the plate across it by ν as much.
-    pub poisson: f64,
+    pub poisson: W,
+}
+
+/// What an element is made of, as its density depends on it; a density may be differentiated by it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stock<W = f64> {
+    /// Half the width, V/2.
+    pub half_width: W,
+    /// Natural bend, and Poisson's ratio.
+    pub curl: Curl<W>,
+    /// Stretching stiffness over the plate's rigidity, as that of the [`Element`].
+    pub stretching: W,
+}
+
+impl Stock {
+    /// The same numbers in another type.
+    pub(crate) fn map<W>(&self, f: impl Fn(f64) -> W) -> Stock<W> {
+        Stock {
+            half_width: f(self.half_width),
+            curl: Curl {
+                bend: f(self.curl.bend),
+                poisson: f(self.curl.poisson),
+            },
+            stretching: f(self.stretching),
+        }
+    }
 }
 
 /// The data of one element.
@@ -123,6 +148,22 @@ impl Element {
         first + (second - first) * ((t - a) / (b - a))
     }
 
+    /// The shares of both numbers of the rigidity in that at parameter t.
+    pub(crate) fn rigidity_shares(t: f64) -> [f64; 2] {
+        let [a, b] = gauss_points();
+        let second = (t - a) / (b - a);
+        [1.0 - second, second]
+    }
+
+    /// What it is made of.
+    pub(crate) fn stock(&self) -> Stock {
+        Stock {
+            half_width: self.half_width,
+            curl: self.curl,
+            stretching: self.stretching,
+        }
+    }
+
     /// The inequalities that keep its ribs apart.
     pub(crate) fn bounds<'a>(&self, edges: &'a ActiveEdges) -> RibBounds<'a> {
         RibBounds {
@@ -133,8 +174,13 @@ impl Element {
 
     /// The strips between its ribs.
     pub(crate) fn strips(&self) -> Strips {
+        self.strips_of(self.half_width)
+    }
+
+    /// The strips between its ribs, of another width.
+    pub(crate) fn strips_of<W>(&self, half_width: W) -> Strips<W> {
         Strips {
-            half_width: self.half_width,
+            half_width,
             geodesic: self.geodesic,
             length: self.length,
         }

@@ -48,6 +48,7 @@ impl Density<3> for FreeTorsion {
                 rates: two(&section.rates),
                 ends: [two(&section.ends[0]), two(&section.ends[1])],
                 element: section.element,
+                stock: section.stock,
             },
         )
     }

@@ -175,10 +175,13 @@ impl density::Density<2> for DevelopableEnergy {
         let [bend, slope] = section.fields;
         let slopes = section.ends.map(|end| end[1]);
         let across = match self.knows_width() {
-            true => section.element.strips().across(slopes),
+            true => section
+                .element
+                .strips_of(section.stock.half_width)
+                .across(slopes),
             false => Across::PLAIN.map(T::from),
         };
-        DevelopableEnergy::value(*self, bend, slope, section.curl(), &across)
+        DevelopableEnergy::value(*self, bend, slope, &section.stock.curl, &across)
     }
 
     fn energy(&self, element: &Element, [a, b]: [&Vector2<f64>; 2]) -> f64 {

@@ -5,11 +5,11 @@ use super::data::{ByData, Data, HALF_WIDTH};
 use super::motion::{add_generalised_force, add_support_motion, motion};
 use crate::equilibrium::Solved;
 use crate::problem::program::{
-    BeltPoint, BeltProgram, DevelopableNode as NodeVector, NodeSupport, Piece, Rows, Turn, rows_of,
-    weight,
+    BeltPoint, BeltProgram, NodeSupport, Piece, Rows, Turn, rows_of, weight,
 };
-use nalgebra::{Vector3, Vector4};
-use stagewise::{Direction as Step, Program};
+use crate::strip::density::Density;
+use nalgebra::Vector3;
+use stagewise::{Direction as Step, NodeVector, Program};
 use std::ops::Range;
 
 /// A change of a programme's data, in its units; or a derivative by such a change.
@@ -23,20 +23,40 @@ pub(super) struct Direction {
     pub(super) weight: Vector3<f64>,
 }
 
+impl Direction {
+    pub(super) fn add(&mut self, factor: f64, other: &Self) {
+        for (own, other) in self.supports.iter_mut().zip(&other.supports) {
+            own.add(factor, other);
+        }
+        for (own, other) in self.elements.iter_mut().zip(&other.elements) {
+            *own += factor * other;
+        }
+        self.weight += factor * other.weight;
+    }
+
+    pub(super) fn dot(&self, other: &Self) -> f64 {
+        let supports = self.supports.iter().zip(&other.supports);
+        let elements = self.elements.iter().zip(&other.elements);
+        supports.map(|(a, b)| a.dot(b)).sum::<f64>()
+            + elements.map(|(a, b)| a.dot(b)).sum::<f64>()
+            + self.weight.dot(&other.weight)
+    }
+}
+
 /// Derivatives of the Lagrangian by the programme's data.
 #[derive(Debug)]
-pub(super) struct System {
-    program: BeltProgram,
-    point: BeltPoint,
+pub(super) struct System<D, const F: usize, const N: usize> {
+    program: BeltProgram<D, F, N>,
+    point: BeltPoint<F>,
     multipliers: Vec<Rows>,
     turns: Vec<Turn>,
-    elements: Vec<Option<ByData>>,
+    elements: Vec<Option<ByData<F>>>,
     /// Rows of the inequalities of every piece.
     rows: Vec<Range<usize>>,
 }
 
-impl System {
-    pub(super) fn new(solved: &Solved) -> Self {
+impl<D: Density<F>, const F: usize, const N: usize> System<D, F, N> {
+    pub(super) fn new(solved: &Solved<D, F, N>) -> Self {
         let (program, point) = (&solved.program, &solved.at.point);
         let multipliers = &solved.at.multipliers;
         let supports = program.supports.iter().enumerate();
@@ -65,7 +85,7 @@ impl System {
     }
 
     /// The flexible elements, each with its number.
-    fn elements(&self) -> impl Iterator<Item = (usize, &ByData)> {
+    fn elements(&self) -> impl Iterator<Item = (usize, &ByData<F>)> {
         let elements = self.elements.iter().enumerate();
         elements.filter_map(|(k, element)| Some((k, element.as_ref()?)))
     }
@@ -80,14 +100,17 @@ impl System {
     }
 
     /// Adds the right-hand side of a change.
-    pub(super) fn add_change(&self, change: &Direction, into: &mut Step<8>) {
+    pub(super) fn add_change(&self, change: &Direction, into: &mut Step<N>) {
         for (i, support, turn) in self.supports() {
             let pose = &self.point.poses[support.node];
             add_support_motion(support, turn, pose, i, &change.supports[i], into);
         }
         for (k, element) in self.elements() {
             let data = &change.elements[k];
-            add_fields(k, &(element.mixed * data), &mut into.nodes);
+            for (node, mixed) in [k, k + 1].into_iter().zip(&element.mixed) {
+                let mut fields = into.nodes[node].fixed_rows_mut::<F>(6);
+                fields += mixed * data;
+            }
             let rows = &mut into.inequalities[self.rows[k].clone()];
             for (row, slack) in rows.iter_mut().zip(&element.slacks) {
                 *row += slack * data[HALF_WIDTH];
@@ -101,7 +124,7 @@ impl System {
 
     /// The derivative, by a change, of a solution's product with the change's right-hand side: the transpose of
     /// [`Self::add_change`].
-    pub(super) fn response(&self, solution: &Step<8>) -> Direction {
+    pub(super) fn response(&self, solution: &Step<N>) -> Direction {
         let mut response = self.unchanged();
         for (i, support, turn) in self.supports() {
             let rows = rows_of(&solution.equalities, i);
@@ -114,7 +137,9 @@ impl System {
         }
         for (k, element) in self.elements() {
             let data = &mut response.elements[k];
-            *data = element.mixed.tr_mul(&fields(k, &solution.nodes));
+            for (node, mixed) in [k, k + 1].into_iter().zip(&element.mixed) {
+                *data += mixed.tr_mul(&solution.nodes[node].fixed_rows::<F>(6));
+            }
             let rows = &solution.inequalities[self.rows[k].clone()];
             for (row, slack) in rows.iter().zip(&element.slacks) {
                 data[HALF_WIDTH] += slack * row;
@@ -179,7 +204,7 @@ impl System {
     }
 
     /// Motion of a node along a step.
-    pub(super) fn motion(&self, node: usize, step: &[NodeVector]) -> Motion {
+    pub(super) fn motion(&self, node: usize, step: &[NodeVector<N>]) -> Motion {
         motion(&self.point.poses[node], &step[node])
     }
 
@@ -189,45 +214,30 @@ impl System {
         node: usize,
         force: &Vector3<f64>,
         moment: &Vector3<f64>,
-        into: &mut [NodeVector],
+        into: &mut [NodeVector<N>],
     ) {
         add_generalised_force(&self.point.poses[node], force, moment, &mut into[node]);
     }
 }
 
-fn by_data(
-    program: &BeltProgram,
-    point: &BeltPoint,
+fn by_data<D: Density<F>, const F: usize, const N: usize>(
+    program: &BeltProgram<D, F, N>,
+    point: &BeltPoint<F>,
     rows: &[Range<usize>],
     multipliers: &[f64],
-) -> Vec<Option<ByData>> {
+) -> Vec<Option<ByData<F>>> {
     let mut by_data: Vec<_> = program.pieces.iter().map(|_| None).collect();
     for (k, element) in program.elements() {
-        let [a, b] = [point.fields[k], point.fields[k + 1]];
-        let fields = Vector4::new(a[0], a[1], b[0], b[1]);
+        let fields = [k, k + 1].map(|node| &point.fields[node]);
         let multipliers = &multipliers[rows[k].clone()];
-        let bounds = program.bounds(k, element);
+        let edges = &program.edges[k];
         by_data[k] = Some(ByData::at(
+            &program.model,
             element,
-            &bounds,
-            program.model,
-            &fields,
+            edges,
+            fields,
             multipliers,
         ));
     }
     by_data
-}
-
-/// Steps of the four unknowns of an element.
-fn fields(element: usize, step: &[NodeVector]) -> Vector4<f64> {
-    let [a, b] = [&step[element], &step[element + 1]];
-    Vector4::new(a[6], a[7], b[6], b[7])
-}
-
-/// Adds a derivative by the four unknowns of an element.
-fn add_fields(element: usize, by_fields: &Vector4<f64>, into: &mut [NodeVector]) {
-    for i in 0..2 {
-        into[element][6 + i] += by_fields[i];
-        into[element + 1][6 + i] += by_fields[2 + i];
-    }
 }

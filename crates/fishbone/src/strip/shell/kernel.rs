@@ -145,7 +145,8 @@ impl Ribs {
         for (weight, [t, share]) in self.weight.iter_mut().zip(GAUSS_4) {
             weight.0[lane] = share * element.length * element.rigidity_at(t);
         }
-        self.plates.set(lane, &super::Plate::of(element));
+        self.plates
+            .set(lane, &super::Plate::of(element.geodesic, &element.stock()));
     }
 }
 

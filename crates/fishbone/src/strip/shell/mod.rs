@@ -17,13 +17,15 @@ mod wide;
 
 use super::bounds::{ACTIVE, Edge};
 use super::density::{Density, Section, slope_beyond};
-use super::element::Element;
+use super::element::{Element, Stock};
+use super::ribs::Scaled;
 use crate::geometry::{Pose, Twist, gauss_points, magnus};
 use across::Across;
 use edge_layer::psi;
 use nalgebra::{SMatrix, SVector, Vector3};
 use num_dual::DualNum;
 use stagewise::StageMatrix;
+use std::ops::{Add, Neg, Sub};
 
 /// Fields of a node, a number.
 pub(crate) const FIELDS: usize = 6;
@@ -57,17 +59,17 @@ impl Shell {
 
 /// The plate that a strip is cut from, at a place of the spine. Lengths in U.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Plate {
+pub(crate) struct Plate<W = f64> {
     /// Half the width.
-    pub(crate) half_width: f64,
+    pub(crate) half_width: W,
     /// In-plane curvature κ_g of the spine.
     pub(crate) geodesic: f64,
     /// Natural curvature along the spine, the b(t,t) of the unloaded strip.
-    pub(crate) natural: f64,
+    pub(crate) natural: W,
     /// Poisson's ratio.
-    pub(crate) poisson: f64,
+    pub(crate) poisson: W,
     /// Stretching stiffness E h over the plate's rigidity D.
-    pub(crate) stretching: f64,
+    pub(crate) stretching: W,
 }
 
 /// What the curvature along a rib depends on.
@@ -168,14 +170,14 @@ impl<T: DualNum<Primitive = f64> + Copy> Curvature<T> {
     }
 }
 
-impl Plate {
-    pub(crate) fn of(element: &Element) -> Self {
+impl<W: Copy + Neg<Output = W>> Plate<W> {
+    pub(crate) fn of(geodesic: f64, stock: &Stock<W>) -> Self {
         Self {
-            half_width: element.half_width,
-            geodesic: element.geodesic,
-            natural: -element.curl.bend,
-            poisson: element.curl.poisson,
-            stretching: element.stretching,
+            half_width: stock.half_width,
+            geodesic,
+            natural: -stock.curl.bend,
+            poisson: stock.curl.poisson,
+            stretching: stock.stretching,
         }
     }
 }
@@ -207,7 +209,11 @@ impl<T: DualNum<Primitive = f64> + Copy> Rib<T> {
     }
 
     /// The curvature at a distance v from the spine, measured across it.
-    pub(crate) fn curvature(&self, geodesic: f64, v: f64) -> Curvature<T> {
+    pub(crate) fn curvature<W>(&self, geodesic: f64, v: W) -> Curvature<T>
+    where
+        T: Scaled<W>,
+        W: DualNum<Primitive = f64> + Copy,
+    {
         let [twist_rate, convergence_rate, growth_rate] = self.rates;
         let (m, s, g) = (self.twist, self.convergence, self.growth);
         let area = -s * v + 1.0;
@@ -215,11 +221,11 @@ impl<T: DualNum<Primitive = f64> + Copy> Rib<T> {
         let square = stretch * stretch;
         // The potential's derivative along the rib is (v m + v² g/2)/(1 − s v); b(t,d) and b(t,t) are its derivatives by v
         // and by u.
-        let mixed = m + g * v - s * g * (0.5 * v * v);
-        let rate = twist_rate * v + growth_rate * (0.5 * v * v);
-        let turned = convergence_rate * (m + g * (0.5 * v)) * (v * v);
-        let board = self.slope * (g * 0.5 + s * m) * (geodesic * v * v);
-        let along = self.bend - self.across * (geodesic * v);
+        let mixed = m + g * v - s * g * (v * 0.5 * v);
+        let rate = twist_rate * v + growth_rate * (v * 0.5 * v);
+        let turned = convergence_rate * (m + g * (v * 0.5)) * (v * v);
+        let board = self.slope * (g * 0.5 + s * m) * (v * geodesic * v);
+        let along = self.bend - self.across * (v * geodesic);
         Curvature {
             along: stretch * along + stretch * square * (rate * area + turned + board),
             mixed: square * mixed,
@@ -231,8 +237,12 @@ impl<T: DualNum<Primitive = f64> + Copy> Rib<T> {
     /// Energy per unit length of the spine at unit rigidity of the whole width, without the term of the gauge.
     ///
     /// Infinite where ribs meet within the width.
-    pub(crate) fn energy(&self, plate: &Plate, rule: &Across) -> T {
-        if self.convergence.re().abs() * plate.half_width >= 1.0 {
+    pub(crate) fn energy<W>(&self, plate: &Plate<W>, rule: &Across) -> T
+    where
+        T: Scaled<W> + Sub<W, Output = T> + Add<W, Output = T>,
+        W: DualNum<Primitive = f64> + Copy,
+    {
+        if self.convergence.re().abs() * plate.half_width.re() >= 1.0 {
             return T::from(f64::INFINITY);
         }
         let (nu, k0, a) = (plate.poisson, plate.natural, plate.half_width);
@@ -245,7 +255,7 @@ impl<T: DualNum<Primitive = f64> + Copy> Rib<T> {
             let mean = b.along + b_vv - k0;
             gauss[i] = b.along * b.across - b.mixed * b.mixed;
             weights[i] = b.area * rule.weight[i];
-            let plate = mean * mean - (gauss[i] - b_vv * k0) * (2.0 * (1.0 - nu));
+            let plate = mean * mean - (gauss[i] - b_vv * k0) * ((-nu + 1.0) * 2.0);
             bending += weights[i] * plate;
         }
         let stretching = strain_square(&gauss, &weights, rule) * (plate.stretching * a.powi(4));
@@ -256,8 +266,12 @@ impl<T: DualNum<Primitive = f64> + Copy> Rib<T> {
     }
 
     /// The number z of the edge layers.
-    fn layer(&self, plate: &Plate) -> T {
-        self.bend * self.bend * (4.0 * plate.stretching * plate.half_width.powi(4))
+    fn layer<W>(&self, plate: &Plate<W>) -> T
+    where
+        T: Scaled<W>,
+        W: DualNum<Primitive = f64> + Copy,
+    {
+        self.bend * self.bend * (plate.stretching * 4.0 * plate.half_width.powi(4))
     }
 }
 
@@ -299,11 +313,11 @@ impl Density<FIELDS> for Shell {
     type Derivatives = kernel::Block;
 
     fn value<T: DualNum<Primitive = f64> + Copy>(&self, section: &Section<'_, T, FIELDS>) -> T {
-        let plate = Plate::of(section.element);
+        let plate = Plate::of(section.element.geodesic, &section.stock);
         let rib = Rib::of(&section.fields, &section.rates, plate.geodesic);
         let y = rib.convergence * plate.half_width;
         let gauge =
-            (y * y + rib.slope * rib.slope) * (0.125 * self.gauge / plate.half_width.powi(2));
+            (y * y + rib.slope * rib.slope) / plate.half_width.powi(2) * (0.125 * self.gauge);
         rib.energy(&plate, &self.across) + gauge
     }
 
@@ -470,7 +484,23 @@ impl Density<FIELDS> for Shell {
             rates,
             ends,
             element,
+            stock: element.stock().map(T::from),
         }
+    }
+
+    fn slacks_of_width<T: DualNum<Primitive = f64> + Copy>(
+        &self,
+        element: &Element,
+        _: &[Option<Edge>; ACTIVE],
+        ends: &[[T; FIELDS]; 2],
+        half_width: T,
+    ) -> Vec<T> {
+        let shares = Share::PLACES.map(|t| {
+            let (fields, rates) = interpolated(*ends, element.length, t);
+            Rib::of(&fields, &rates, element.geodesic).convergence * half_width
+        });
+        let slacks = |share: T| [-share + CLOSEST, share + CLOSEST];
+        shares.into_iter().flat_map(slacks).collect()
     }
 }
 
