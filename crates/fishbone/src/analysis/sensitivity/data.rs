@@ -165,7 +165,7 @@ mod tests {
     use crate::strip::bounds::{Edge, moved_out};
     use crate::strip::density::{Derivatives, Loaded};
     use crate::strip::developable::DevelopableEnergy;
-    use crate::strip::shell::Shell;
+    use crate::strip::shell::{Gauge, Shell};
     use nalgebra::Vector2;
 
     fn element() -> Element {
@@ -319,7 +319,7 @@ mod tests {
             SVector::from([2.5, 0.36, 2.5, 0.1, -0.6, 3.0]),
         ];
         let multipliers: Vec<f64> = (1..=12).map(|i| 0.1 * f64::from(i)).collect();
-        let shell = Shell::new(3e-4, 6);
+        let shell = Shell::new(Gauge::WEAK, 6);
         check(
             &shell,
             &element,

@@ -9,13 +9,13 @@ mod model;
 use super::accuracy::{MeshError, Quantities};
 use super::intrinsic;
 use super::judged::Judged;
-use super::search::{self, MinimumSettings};
+use super::search::{self, MinimumSettings, Search};
 use super::{AnySolved, Equilibrium, Solved, Stability, Status, left_free};
 use crate::problem::program::{BeltPoint, BeltProgram, Piece};
 use crate::problem::{Mesh, Problem};
 use crate::scenario::EnergyModel;
 use crate::strip::density::Density;
-use crate::strip::shell::{FIELDS, Shell, interpolated, slope_step};
+use crate::strip::shell::{FIELDS, Gauge, Shell, interpolated, slope_step};
 use nalgebra::SVector;
 use stagewise::{Distance, Multipliers, Outcome, Program, Settings, Solution, Stationary, assess};
 use std::ops::ControlFlow;
@@ -26,10 +26,8 @@ type Proceed<'a> = dyn FnMut() -> ControlFlow<()> + 'a;
 type ShellProgram = BeltProgram<Shell, FIELDS, 12>;
 type ShellSolution = Solution<BeltPoint<FIELDS>>;
 
-/// Weights of the gauge, the strong one first. The weak one changes energies by less than 2e-4 of themselves.
-const GAUGES: [f64; 2] = [1e-2, 3e-4];
-/// Points across the width, a number.
-const POINTS: usize = 6;
+/// Points across the width, a number: where ribs come nearly as close as they may, the energy taken at 6 is off by up to 1 %.
+const POINTS: usize = 8;
 /// First barriers of the search with the strong gauge, and with the weak one, in mean R_f/U.
 const BARRIERS: [f64; 2] = [1e-3, 1e-4];
 /// Error over its change on halving all elements: energies converge with the length of elements, dimensionless.
@@ -64,8 +62,7 @@ pub(crate) fn next_to(problem: &Problem, found: Equilibrium, proceed: &mut Proce
     let from_start = |mesh: &Mesh, proceed: &mut Proceed| {
         let bare = problem.program_on(mesh)?;
         let shape = search::prolonged(&start.program, &start.at.point, &bare);
-        let (program, solution) = from_developable(problem, &bare, &shape, proceed);
-        Some((program, solution))
+        Some(from_developable(problem, &bare, &shape, proceed))
     };
     let mesh = Mesh::uniform(problem, problem.elements());
     let (mut program, mut solution) =
@@ -275,7 +272,7 @@ fn hides_energy(problem: &Problem, program: &ShellProgram, solution: &ShellSolut
     /// Change of the energy that is no error of the integral, as a share of the energy.
     const CHANGE: f64 = 1e-3;
     /// Parts of an element along the belt, and points across it, a number.
-    const FINER: [usize; 2] = [4, 8];
+    const FINER: [usize; 2] = [4, 12];
     let Some(mut finer) = split(problem, program, FINER[0]) else {
         return true;
     };
@@ -318,15 +315,50 @@ fn settings(problem: &Problem, barrier: f64) -> Settings {
     }
 }
 
-/// The minimum of a strip of finite thickness next to the shape of a developable one, on its mesh.
+/// The minimum of a strip of finite thickness next to the shape of a developable one, on its mesh. Where the shape leads to none,
+/// those of wider developable belts follow, whose ribs keep farther apart.
 fn from_developable(
     problem: &Problem,
     developable: &BeltProgram,
     shape: &BeltPoint,
     proceed: &mut Proceed,
 ) -> (ShellProgram, ShellSolution) {
-    let [strong, weak] = GAUGES.map(|gauge| developable.as_shell(Shell::new(gauge, POINTS)));
+    /// Widths of the other developable belts, over the width.
+    const WIDER: [f64; 2] = [1.25, 1.5];
+    let (mut program, mut solution) = from_shape(problem, developable, shape, proceed);
+    for wider in WIDER {
+        if matches!(solution.outcome, Outcome::Converged | Outcome::Interrupted) {
+            break;
+        }
+        let search = Search::of(problem);
+        let wide = developable.clone().widened(wider);
+        let barrier = search.settings.close_barrier;
+        let apart = search.only_from(&wide, shape.clone(), barrier, proceed);
+        let iterations = solution.iterations + apart.iterations;
+        if apart.outcome == Outcome::Converged {
+            (program, solution) = from_shape(problem, developable, &apart.at.point, proceed);
+        }
+        solution = solution.after(iterations);
+    }
+    (program, solution)
+}
+
+/// The minimum of a strip of finite thickness that a search from one shape finds: with the strong gauge, then with the weak one.
+fn from_shape(
+    problem: &Problem,
+    developable: &BeltProgram,
+    shape: &BeltPoint,
+    proceed: &mut Proceed,
+) -> (ShellProgram, ShellSolution) {
+    /// Iterations that the search with the strong gauge may take, a number: most take 10 to 60.
+    const ITERATIONS: usize = 150;
+    let [strong, weak] =
+        [Gauge::STRONG, Gauge::WEAK].map(|gauge| developable.as_shell(Shell::new(gauge, POINTS)));
     let [wide, narrow] = BARRIERS.map(|barrier| settings(problem, barrier));
+    let wide = Settings {
+        iterations: ITERATIONS,
+        ..wide
+    };
     let first = stagewise::minimise(&strong, &wide, start(&strong, shape), proceed);
     let iterations = first.iterations;
     if first.outcome != Outcome::Converged {

@@ -1,14 +1,14 @@
 //! A strip of finite thickness as the analyses follow it: on uniform meshes, with the weak gauge.
 
 use super::{
-    BARRIERS, GAUGES, HALVINGS, POINTS, Proceed, ShellProgram, ShellSolution, change, drawn_in,
-    halved, judged, prolonged, settings, shared_out, solve,
+    BARRIERS, HALVINGS, POINTS, Proceed, ShellProgram, ShellSolution, change, drawn_in, halved,
+    judged, prolonged, settings, shared_out, solve,
 };
 use crate::equilibrium::model::{AnyStationary, StripModel};
 use crate::equilibrium::{AnySolved, Equilibrium, Solved, Status};
 use crate::problem::program::BeltPoint;
 use crate::problem::{Mesh, Problem};
-use crate::strip::shell::{FIELDS, Shell};
+use crate::strip::shell::{FIELDS, Gauge, Shell};
 use stagewise::{Multipliers, Outcome, Settings, Stationary, assess};
 use std::ops::ControlFlow;
 
@@ -25,7 +25,7 @@ impl StripModel<FIELDS, 12> for Shell {
     }
 
     fn program_on(problem: &Problem, mesh: &Mesh) -> Option<ShellProgram> {
-        let weak = Shell::new(GAUGES[1], POINTS);
+        let weak = Shell::new(Gauge::WEAK, POINTS);
         Some(problem.program_on(mesh)?.as_shell(weak))
     }
 
@@ -112,7 +112,7 @@ impl StripModel<FIELDS, 12> for Shell {
             return solve(problem, proceed);
         };
         let mut strong = weak.clone();
-        strong.model = Self::new(GAUGES[0], POINTS);
+        strong.model = Self::new(Gauge::STRONG, POINTS);
         let downhill = Settings::downhill(problem.tolerance(), 1.0);
         let start = drawn_in(&strong, shape.clone());
         let down = stagewise::minimise(&strong, &downhill, start, proceed);

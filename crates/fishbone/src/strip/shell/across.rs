@@ -1,7 +1,7 @@
 //! Integrals across the width of a strip: Gauss's rule, and the strain along the strip that its Gauss curvature asks for.
 
 /// Greatest count of points across the width, a number.
-pub(crate) const MOST: usize = 8;
+pub(crate) const MOST: usize = 12;
 /// Greatest count of modes of the strain along the strip, a number.
 pub(crate) const MODES: usize = MOST - 2;
 
@@ -29,7 +29,7 @@ impl Across {
     ///
     /// # Panics
     ///
-    /// Unless there are 2 to 8 points.
+    /// Unless there are 2 to [`MOST`] points.
     pub(crate) fn gauss(points: usize) -> Self {
         assert!((2..=MOST).contains(&points));
         let mut rule = Self {

@@ -33,18 +33,42 @@ pub(crate) const FIELDS: usize = 6;
 /// Energy of a strip of finite width and thickness.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Shell {
-    /// Weight ε of the term that chooses one of the rib slopes which describe nearly the same surface.
-    gauge: f64,
+    /// The term that chooses one of the rib slopes which describe nearly the same surface.
+    gauge: Gauge,
     /// Rule of the integrals across the width.
     across: Across,
+}
+
+/// Weights of the term that chooses one of the rib slopes which describe nearly the same surface, dimensionless: at unit
+/// rigidity it is `(ε (y² + β²) + ε' (V y')² /(V √(E h/D))) / (2 V²)`, with the share `y = s V/2` of the convergence at which
+/// ribs meet.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Gauge {
+    /// Weight ε of the squares of slope and convergence.
+    pub(crate) slopes: f64,
+    /// Weight ε' of the square of the convergence's rate. Without it ribs of thick strips sway to and fro within the width.
+    pub(crate) sway: f64,
+}
+
+impl Gauge {
+    /// The gauge of a solve. It changes energies by less than 1e-3 of themselves.
+    pub(crate) const WEAK: Self = Self {
+        slopes: 3e-4,
+        sway: 0.1,
+    };
+    /// A gauge so strong that the energy has no minima with ribs that all but meet beside a clamp.
+    pub(crate) const STRONG: Self = Self {
+        slopes: 1e-2,
+        ..Self::WEAK
+    };
 }
 
 /// Largest share |s| V/2 of the convergence at which ribs meet at the edge, dimensionless.
 const CLOSEST: f64 = 0.9;
 
 impl Shell {
-    /// The strip with a weight of the gauge and a number of points across the width, from 2 to 8.
-    pub(crate) fn new(gauge: f64, points: usize) -> Self {
+    /// The strip with a gauge and a number of points across the width, from 2 to 12.
+    pub(crate) fn new(gauge: Gauge, points: usize) -> Self {
         Self {
             gauge,
             across: Across::gauss(points),
@@ -315,9 +339,11 @@ impl Density<FIELDS> for Shell {
     fn value<T: DualNum<Primitive = f64> + Copy>(&self, section: &Section<'_, T, FIELDS>) -> T {
         let plate = Plate::of(section.element.geodesic, &section.stock);
         let rib = Rib::of(&section.fields, &section.rates, plate.geodesic);
-        let y = rib.convergence * plate.half_width;
-        let gauge =
-            (y * y + rib.slope * rib.slope) / plate.half_width.powi(2) * (0.125 * self.gauge);
+        let (a, y) = (plate.half_width, rib.convergence * plate.half_width);
+        let [_, convergence_rate, _] = rib.rates;
+        let slopes = (y * y + rib.slope * rib.slope) / (a * a) * self.gauge.slopes;
+        let sway = convergence_rate * convergence_rate * a / plate.stretching.sqrt();
+        let gauge = (slopes + sway * (2.0 * self.gauge.sway)) * 0.125;
         rib.energy(&plate, &self.across) + gauge
     }
 

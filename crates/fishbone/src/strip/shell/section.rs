@@ -12,6 +12,7 @@
 
 mod point;
 
+use super::Gauge;
 use super::across::{Across, MODES, MOST};
 use super::edge_layer::psi_jet;
 use super::wide::Wide;
@@ -175,7 +176,7 @@ impl Strain {
 
 /// The density of every lane at numbers x; infinite where ribs meet within the width.
 #[inline(always)]
-pub(super) fn density(x: &Row, plates: &Plates, rule: &Across, gauge: f64) -> Wide {
+pub(super) fn density(x: &Row, plates: &Plates, rule: &Across, gauge: Gauge) -> Wide {
     let mut points = [Point::NONE; MOST];
     let (view, strain) = (View::of(x, plates), Strain::of(x, plates, rule));
     let mut sum = Wide::ZERO;
@@ -194,8 +195,10 @@ pub(super) fn density(x: &Row, plates: &Plates, rule: &Across, gauge: f64) -> Wi
         work -= strain.y * modes[n] * modes[n - 1] * (2.0 * rule.beside[n]);
     }
     let layers = Layers::of(x, plates);
-    let [convergence, slope] = gauge_factors(plates, gauge);
-    let gauge = convergence * x[CONVERGENCE].square() + slope * x[SLOPE].square();
+    let [convergence, slope, rate] = gauge_factors(plates, gauge);
+    let gauge = convergence * x[CONVERGENCE].square()
+        + slope * x[SLOPE].square()
+        + rate * x[CONVERGENCE_RATE].square();
     sum += plates.stiffness() * work * 0.25;
     sum -= layers.moment * layers.moment * layers.share[0] * 0.5;
     sum += gauge * 0.5;
@@ -209,7 +212,7 @@ pub(super) fn differentiate<const CURVED: bool>(
     x: &Row,
     plates: &Plates,
     rule: &Across,
-    gauge: f64,
+    gauge: Gauge,
     work: &mut Work,
     into: &mut Jet,
 ) {
@@ -252,11 +255,13 @@ pub(super) fn differentiate<const CURVED: bool>(
     let twice = narrowing * plates.half_width * linear[2] * modes[0] * modes[0];
     into.add(CONVERGENCE, CONVERGENCE, -(twice * 0.5));
     Layers::of(x, plates).add(x, plates.poisson, into);
-    let [convergence, slope] = gauge_factors(plates, gauge);
+    let [convergence, slope, rate] = gauge_factors(plates, gauge);
     into.gradient[CONVERGENCE] += convergence * x[CONVERGENCE];
     into.gradient[SLOPE] += slope * x[SLOPE];
+    into.gradient[CONVERGENCE_RATE] += rate * x[CONVERGENCE_RATE];
     into.add(CONVERGENCE, CONVERGENCE, convergence);
     into.add(SLOPE, SLOPE, slope);
+    into.add(CONVERGENCE_RATE, CONVERGENCE_RATE, rate);
 }
 
 /// Adds the points' part of the derivatives but for the derivatives of b(t,t), whose factors are kept, and for the squares of
@@ -531,10 +536,11 @@ impl Layers {
     }
 }
 
-/// Factors of the squares of s and β, doubled, in the term that chooses one of the rib slopes.
+/// Factors of the squares of s, β and s', doubled, in the term that chooses one of the rib slopes.
 #[inline(always)]
-fn gauge_factors(plates: &Plates, gauge: f64) -> [Wide; 2] {
-    let by_convergence = Wide::all(0.25 * gauge);
+fn gauge_factors(plates: &Plates, gauge: Gauge) -> [Wide; 3] {
+    let by_convergence = Wide::all(0.25 * gauge.slopes);
     let by_slope = by_convergence * plates.half_width.square().recip();
-    [by_convergence, by_slope]
+    let by_rate = plates.half_width * plates.stretching.sqrt().recip() * (0.5 * gauge.sway);
+    [by_convergence, by_slope, by_rate]
 }

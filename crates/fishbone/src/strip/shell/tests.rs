@@ -36,6 +36,12 @@ impl Reference {
     }
 }
 
+/// No term that chooses a rib slope.
+const NO_GAUGE: Gauge = Gauge {
+    slopes: 0.0,
+    sway: 0.0,
+};
+
 /// Reference values of an independent implementation by automatic differentiation. They include the term of the gauge of
 /// weight 3e-4.
 const REFERENCES: [Reference; 8] = [

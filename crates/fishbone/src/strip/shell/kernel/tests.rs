@@ -5,11 +5,12 @@ use crate::geometry::exp;
 use crate::strip::automatic;
 use crate::strip::density::{Derivatives as _, Motions as _};
 use crate::strip::element::Curl;
+use crate::strip::shell::Gauge;
 use approx::assert_relative_eq;
 use nalgebra::{Vector3, Vector6};
 
 fn shell() -> Shell {
-    Shell::new(3e-4, 6)
+    Shell::new(Gauge::WEAK, 6)
 }
 
 fn element(geodesic: f64, bend: f64) -> Element {

@@ -28,7 +28,7 @@ const fn joint(angle: f64, geodesic: [f64; 2]) -> Joint {
 }
 
 fn beyond(joint: &Joint, fields: &[f64; FIELDS]) -> [f64; FIELDS] {
-    Shell::new(3e-4, 6)
+    Shell::new(Gauge::WEAK, 6)
         .beyond(joint.angle, joint.geodesic, fields)
         .unwrap()
 }
@@ -114,7 +114,7 @@ fn test_convergence_and_growth_go_on_where_only_the_in_plane_curvature_jumps() {
 
 #[test]
 fn test_no_rib_passes_a_corner_that_it_would_leave_through() {
-    let shell = Shell::new(3e-4, 6);
+    let shell = Shell::new(Gauge::WEAK, 6);
     let mut fields = FIELDS_BEFORE[0];
     fields[1] = -3.0;
     assert!(shell.beyond(0.5, [0.0; 2], &fields).is_none());

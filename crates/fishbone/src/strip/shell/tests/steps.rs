@@ -15,7 +15,7 @@ const NODES: [[f64; FIELDS]; 3] = [
 const STEP: [f64; FIELDS] = [0.7, -0.3, 2.0, 0.4, -0.25, 3.0];
 
 fn shell() -> Shell {
-    Shell::new(3e-4, 6)
+    Shell::new(Gauge::WEAK, 6)
 }
 
 /// Curvature k, τ, δ of the spine by the axes of the board.
@@ -236,20 +236,33 @@ fn test_within_an_element_bend_and_twist_are_linear_and_slope_and_bend_across_ar
 }
 
 #[test]
-fn test_the_term_of_the_gauge_is_its_weight_times_the_squares_of_slope_and_convergence() {
-    let weight = 1e-2;
+fn test_the_term_of_the_gauge_is_its_weights_times_the_squares_of_slope_convergence_and_sway() {
     for geodesic in BOARDS {
         let element = element(geodesic);
         let ends = [NODES[0], NODES[0].map(|field| 1.01 * field)];
-        let energy = |weight: f64| {
-            let shell = Shell::new(weight, 6);
+        let energy = |slopes: f64, sway: f64| {
+            let shell = Shell::new(Gauge { slopes, sway }, 6);
             shell.value(&shell.section(&element, ends, 0.3))
         };
-        let section = shell().section(&element, ends, 0.3);
-        let [_, slope, slope_rate, ..] = section.fields;
-        let y = 0.05 * (slope_rate + geodesic * (1.0 + slope * slope));
-        // ½ ε (D/V) (y² + β²) at D V = 1 and V = 0.1.
-        let exact = 0.5 * weight * 100.0 * (y * y + slope * slope);
-        assert_relative_eq!(energy(weight) - energy(0.0), exact, max_relative = 1e-9);
+        let share = |t: f64| {
+            let [_, slope, slope_rate, ..] = shell().section(&element, ends, t).fields;
+            0.05 * (slope_rate + geodesic * (1.0 + slope * slope))
+        };
+        let slope = shell().section(&element, ends, 0.3).fields[1];
+        let step = 1e-4;
+        let rate = (share(0.3 + step) - share(0.3 - step)) / (2.0 * step * element.length);
+        // ½ (D/V) (ε (y² + β²) + ε' (V y')² h̃/V) at D V = 1 and V = 0.1, with h̃ = √(D/(E h)).
+        let by_slopes = 0.5 * 100.0 * (share(0.3).powi(2) + slope * slope);
+        let by_sway = 0.5 * 100.0 * (0.1 * rate).powi(2) / (0.1 * element.stretching.sqrt());
+        assert_relative_eq!(
+            energy(1e-2, 0.0) - energy(0.0, 0.0),
+            1e-2 * by_slopes,
+            max_relative = 1e-9
+        );
+        assert_relative_eq!(
+            energy(0.0, 0.3) - energy(0.0, 0.0),
+            0.3 * by_sway,
+            max_relative = 1e-6
+        );
     }
 }

@@ -158,7 +158,7 @@ fn test_the_curvature_on_the_spine_is_that_of_the_fields() {
                 max_relative = 1e-11,
                 epsilon = 1e-11
             );
-            let shell = Shell::new(0.0, 6);
+            let shell = Shell::new(NO_GAUGE, 6);
             let [torsion, bend] = shell.torsion_and_bend(&fields);
             assert_relative_eq!(torsion, b(&t, &n), max_relative = 1e-11, epsilon = 1e-11);
             assert_relative_eq!(bend, -b(&t, &t), max_relative = 1e-11);
