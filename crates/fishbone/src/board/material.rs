@@ -21,10 +21,10 @@ pub(crate) struct Layer {
 }
 
 /// Bending data of a stack of bonded layers; a single sheet is a stack of one layer.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Laminate {
-    /// Height z₀ of the neutral surface above the bottom. Units: m.
-    pub neutral: f64,
+    /// Heights above the neutral surface, from the bottom face through the faces between layers to the top face. Units: m.
+    pub faces: Vec<f64>,
     /// Flexural rigidity per width, D₁₁. Units: N·m.
     pub rigidity: f64,
     /// Stretching stiffness along the strip per width, E h of a sheet: free to contract across. Units: N/m.
@@ -141,8 +141,12 @@ impl Laminate {
             layers.iter().map(stretch).sum(),
             layers.iter().map(contraction).sum(),
         ];
+        let tops = layers.iter().scan(-neutral, |top, layer| {
+            *top += layer.thickness;
+            Some(*top)
+        });
         Self {
-            neutral,
+            faces: [-neutral].into_iter().chain(tops).collect(),
             rigidity,
             stretching: along - across * across / along,
             poisson: coupling / rigidity,
@@ -196,7 +200,8 @@ mod tests {
         let sheet = Laminate::of(&[layer(PET, 1e-4)]);
         let expected = 4.9e9 * 1e-12 / (12.0 * (1.0 - 0.38 * 0.38));
         assert_relative_eq!(sheet.rigidity, expected, max_relative = 1e-14);
-        assert_relative_eq!(sheet.neutral, 0.5e-4, max_relative = 1e-14);
+        assert_relative_eq!(sheet.faces[0], -0.5e-4, max_relative = 1e-14);
+        assert_relative_eq!(sheet.faces[1], 0.5e-4, max_relative = 1e-14);
         assert_relative_eq!(sheet.poisson, 0.38, max_relative = 1e-14);
         assert_relative_eq!(sheet.mass.unwrap_or_default(), 0.139, max_relative = 1e-14);
     }
@@ -206,7 +211,9 @@ mod tests {
         let whole = Laminate::of(&[layer(PET, 1e-4)]);
         let cut = Laminate::of(&[layer(PET, 2e-5), layer(PET, 5e-5), layer(PET, 3e-5)]);
         assert_relative_eq!(cut.rigidity, whole.rigidity, max_relative = 1e-13);
-        assert_relative_eq!(cut.neutral, whole.neutral, max_relative = 1e-13);
+        assert_relative_eq!(cut.faces[0], whole.faces[0], max_relative = 1e-13);
+        assert_relative_eq!(cut.faces[3], whole.faces[1], max_relative = 1e-13);
+        assert_relative_eq!(cut.faces[1], -3e-5, max_relative = 1e-13);
         assert_relative_eq!(cut.poisson, whole.poisson, max_relative = 1e-13);
     }
 
@@ -219,7 +226,9 @@ mod tests {
             density: None,
         };
         let laminate = Laminate::of(&[layer(of(1.0, 0.0), 1.0), layer(of(3.0, 0.4), 1.0)]);
-        assert_relative_eq!(laminate.neutral, 1.25, max_relative = 1e-14);
+        for (face, height) in laminate.faces.iter().zip([-1.25, -0.25, 0.75]) {
+            assert_relative_eq!(*face, height, max_relative = 1e-14);
+        }
         assert_relative_eq!(laminate.rigidity, 13.0 / 12.0, max_relative = 1e-14);
         // The upper layer's part of D₁₁ is (1/4 + 3/16)/(13/12) = 21/52.
         assert_relative_eq!(laminate.poisson, 0.4 * 21.0 / 52.0, max_relative = 1e-14);
@@ -229,7 +238,8 @@ mod tests {
     #[test]
     fn test_a_symmetric_circuit_bends_about_its_middle() {
         let laminate = Laminate::of(&circuit());
-        assert_relative_eq!(laminate.neutral, 67.5e-6, max_relative = 1e-13);
+        assert_relative_eq!(laminate.faces[0], -67.5e-6, max_relative = 1e-13);
+        assert_eq!(laminate.faces.len(), 6);
         let turned: Vec<Layer> = circuit().into_iter().rev().collect();
         assert_relative_eq!(
             Laminate::of(&turned).rigidity,

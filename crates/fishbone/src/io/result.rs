@@ -254,7 +254,7 @@ impl Support {
 }
 
 impl LeastBendRadius {
-    fn new(radius: Option<surface::BendRadius>) -> Self {
+    fn new(radius: Option<surface::Extreme>) -> Self {
         Self {
             value: radius.map(|radius| radius.value),
             u: radius.map(|radius| radius.u),

@@ -8,7 +8,7 @@ use crate::problem::program::{
 };
 use crate::scenario::{Axis, Place, SAME_PLACE, SupportSpec};
 use crate::strip::density::Density;
-use crate::strip::spine::{CurvedRibs, Piece, Spine};
+use crate::strip::spine::{CurvedRibs, Piece, Sheet, Spine};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use std::f64::consts::PI;
 
@@ -97,7 +97,29 @@ impl Problem {
             curved: program
                 .model
                 .curved(&point.fields, length)
-                .map(CurvedRibs::from),
+                .map(|fields| self.curved_ribs(fields, &program.pieces)),
+        }
+    }
+
+    /// The curved ribs of given fields, in the units of the scenario.
+    fn curved_ribs(&self, fields: [Vec<f64>; 4], pieces: &[program::Piece]) -> CurvedRibs {
+        let length = self.units.length;
+        let sheet = |piece: &program::Piece| match piece {
+            program::Piece::Strip(element) => Sheet {
+                poisson: element.curl.poisson,
+                stretching: element.stretching / (length * length),
+                natural: -element.curl.bend / length,
+            },
+            program::Piece::Rigid { .. } | program::Piece::Joint { .. } => Sheet::RIGID,
+        };
+        let [slope_rate, twist, across, across_rate] = fields;
+        CurvedRibs {
+            slope_rate,
+            twist,
+            across,
+            across_rate,
+            sheets: pieces.iter().map(sheet).collect(),
+            faces: self.scenario.belt.faces(),
         }
     }
 

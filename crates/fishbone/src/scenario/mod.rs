@@ -171,6 +171,14 @@ impl BeltSpec {
         of_layers().or_else(|| self.thickness.map(of_sheet))
     }
 
+    /// Heights along ξ above the neutral surface, from the bottom face through the faces between layers to the top face; none
+    /// where no thickness is known. Units: m.
+    pub(crate) fn faces(&self) -> Vec<f64> {
+        let half = self.thickness.map(|thickness| 0.5 * thickness);
+        let of_sheet = || half.map_or_else(Vec::new, |half| vec![-half, half]);
+        self.laminate().map_or_else(of_sheet, |of| of.faces)
+    }
+
     /// Thickness of the sheet or of all layers, or as given; `None` where the belt is given by its rigidity alone.
     pub(crate) fn thickness_value(&self) -> Option<f64> {
         let sheet = self.material.as_ref().map(|sheet| sheet.thickness);

@@ -62,7 +62,7 @@ pub struct Spine {
     pub(crate) curved: Option<CurvedRibs>,
 }
 
-/// The fields of a strip of finite thickness beyond bend and rib slope, at every node of its spine.
+/// The fields of a strip of finite thickness beyond bend and rib slope, at every node of its spine, and what it is made of.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct CurvedRibs {
     /// Rate of the rib slope; the slope is cubic in between.
@@ -73,17 +73,30 @@ pub(crate) struct CurvedRibs {
     pub(crate) across: Vec<f64>,
     /// Rate of the bend of the rib.
     pub(crate) across_rate: Vec<f64>,
+    /// The sheet of every element; of stiffeners and joints, which do not bend, [`Sheet::RIGID`].
+    pub(crate) sheets: Vec<Sheet>,
+    /// Heights along ξ above the neutral surface, from the bottom face through the faces between layers to the top face.
+    pub(crate) faces: Vec<f64>,
 }
 
-impl From<[Vec<f64>; 4]> for CurvedRibs {
-    fn from([slope_rate, twist, across, across_rate]: [Vec<f64>; 4]) -> Self {
-        Self {
-            slope_rate,
-            twist,
-            across,
-            across_rate,
-        }
-    }
+/// What the strain of an element depends on besides its curvature.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Sheet {
+    /// Poisson's ratio ν.
+    pub(crate) poisson: f64,
+    /// Stretching stiffness E h over the rigidity D.
+    pub(crate) stretching: f64,
+    /// Natural curvature along the spine, of the unloaded board.
+    pub(crate) natural: f64,
+}
+
+impl Sheet {
+    /// The sheet of a piece that does not bend.
+    pub(crate) const RIGID: Self = Self {
+        poisson: 0.0,
+        stretching: f64::INFINITY,
+        natural: 0.0,
+    };
 }
 
 /// The spine at one arc length.

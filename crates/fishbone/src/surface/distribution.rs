@@ -4,8 +4,8 @@
 //! exceeded on a given share of the area converges.
 
 use super::curvature::curvature;
-use super::curved::{Bent, bends};
 use super::extremes::{Part, smooth_parts};
+use super::thick::{Shares, ThickBoard};
 use crate::board::feet::Board;
 use crate::board::outline::outline;
 use crate::strip::flat::FLAT;
@@ -21,8 +21,8 @@ const RADII: [f64; 2] = [1e-12, 1e12];
 #[derive(Debug, Clone)]
 pub struct BendDistribution {
     cells: Vec<Cell>,
-    /// Points of a strip of finite thickness, in place of cells.
-    bends: Vec<Bent>,
+    /// Bends of a strip of finite thickness, in place of cells.
+    bends: Option<Shares>,
     /// Area of the board.
     area: f64,
     /// Width of the board.
@@ -43,7 +43,7 @@ impl BendDistribution {
             .flat_map(|part| parts_of_one_sign(spine, part));
         Self {
             cells: parts.flat_map(|part| cells(spine, &board, part)).collect(),
-            bends: bends(spine),
+            bends: ThickBoard::of(spine).map(|board| board.bends()),
             area: outline(spine).area(),
             width: spine.width,
         }
@@ -52,9 +52,9 @@ impl BendDistribution {
     /// Share of the board's area with a bend radius below a finite one.
     pub fn share_below(&self, radius: f64) -> f64 {
         let areas = self.cells.iter().map(|cell| cell.area_below(radius));
-        let tighter = self.bends.iter().filter(|bent| bent.radius.value < radius);
-        let points = tighter.map(|bent| bent.area).sum::<f64>();
-        (areas.sum::<f64>() + points) / self.area
+        let bends = self.bends.as_ref();
+        let bent = bends.map_or(0.0, |bends| bends.area_above(1.0 / radius));
+        (areas.sum::<f64>() + bent) / self.area
     }
 
     /// Radii exceeded on 99.9, 99 and 95 % of the board's area.

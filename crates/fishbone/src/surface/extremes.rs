@@ -1,7 +1,7 @@
 //! Highest point, tightest bend, narrowest margin.
 
-use super::curvature::{bend_radius, curvature};
-use super::curved::{bends, radii_on_spine};
+use super::curvature::{FirstForm, SecondForm, bend_radius, curvature, principal_curvatures};
+use super::thick::ThickBoard;
 use crate::board::feet::Board;
 use crate::strip::flat::FLAT;
 use crate::strip::ribs::rib_convergence_bound;
@@ -81,14 +81,14 @@ fn bisect(f: impl Fn(f64) -> f64, mut a: f64, mut b: f64) -> f64 {
     0.5 * (a + b)
 }
 
-/// The tightest bend of the surface.
+/// An extreme value over the board, with its place.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BendRadius {
-    /// Radius; 0 where ribs meet on an edge.
+pub struct Extreme {
+    /// The value; a radius is 0 where straight ribs meet on an edge.
     pub value: f64,
-    /// Arc length of the foot of its rib.
+    /// Arc length u of the place; where ribs are straight, of the foot of its rib.
     pub u: f64,
-    /// Coordinate v on the rib.
+    /// Distance v of the place from the spine, in the flat board.
     pub v: f64,
 }
 
@@ -130,6 +130,24 @@ pub fn least_spine_radius(spine: &Spine) -> Option<SpineRadius> {
     };
     let least = radii.into_iter().min_by(|a, b| a.value.total_cmp(&b.value));
     least.filter(|radius| radius.value * FLAT < spine.length())
+}
+
+/// Radii of a strip of finite thickness at points of its spine.
+fn radii_on_spine(spine: &Spine) -> Vec<SpineRadius> {
+    /// Parts of an element between the points, a number.
+    const PARTS: usize = 4;
+    let places = |element: usize| (0..=PARTS).map(move |i| (element, i as f64 / PARTS as f64));
+    let at = |(element, share): (usize, f64)| {
+        let distance = share * spine.element_length(element);
+        let rib = spine.rib(element, distance)?;
+        let [l, m, n] = rib.curvature(0.0, 0.0).on_board(rib.slope);
+        let (larger, _) = principal_curvatures(&FirstForm::ON_SPINE, &SecondForm { l, m, n });
+        Some(SpineRadius {
+            value: 1.0 / larger.abs(),
+            u: spine.u[element] + distance,
+        })
+    };
+    spine.strips().flat_map(places).filter_map(at).collect()
 }
 
 fn node_curvature(spine: &Spine, node: usize) -> f64 {
@@ -181,14 +199,17 @@ const SAMPLES: usize = 8;
 /// The least radius of bend over the whole width, (1 − v s)/|κ₁|; `None` where the belt is flat all over, as for
 /// [`least_spine_radius`].
 ///
-/// The tightest point of a straight rib is the end towards which the ribs converge. Of a strip of finite thickness the radius is
-/// that of the strip without the layers along its free edges.
-pub fn least_bend_radius(spine: &Spine) -> Option<BendRadius> {
-    least_spine_radius(spine)?;
-    if spine.curved.is_some() {
-        let radii = bends(spine).into_iter().map(|bent| bent.radius);
-        return radii.min_by(|a, b| a.value.total_cmp(&b.value));
+/// The tightest point of a straight rib is the end towards which the ribs converge.
+///
+/// Of a strip of finite thickness the radius converges with the mesh: it is that of the whole board, the layers along its free
+/// edges included, at least V/5 away from ends of the board, stiffeners, corners and places where the bend may jump, as at
+/// supports; nearer, the radius of a sheet at a clamp's corners has no lower bound but its thickness. `None` also where no
+/// part of the board is so far from them.
+pub fn least_bend_radius(spine: &Spine) -> Option<Extreme> {
+    if let Some(board) = ThickBoard::of(spine) {
+        return board.least_radius();
     }
+    least_spine_radius(spine)?;
     let board = Board::of(spine);
     let parts = spine
         .strips()
@@ -220,18 +241,18 @@ pub(super) fn smooth_parts(spine: &Spine, board: &Board, element: usize) -> Vec<
         .collect()
 }
 
-fn tightest_in(spine: &Spine, board: &Board, part: Part) -> BendRadius {
+fn tightest_in(spine: &Spine, board: &Board, part: Part) -> Extreme {
     let radius = |distance: f64| tightest_on_rib(spine, board, part.element, distance);
     let step = (part.to - part.from) / SAMPLES as f64;
     let samples = (0..=SAMPLES).map(|i| radius(part.from + i as f64 * step));
-    let sharper = |a: BendRadius, b: BendRadius| if b.value < a.value { b } else { a };
+    let sharper = |a: Extreme, b: Extreme| if b.value < a.value { b } else { a };
     let best = samples.fold(radius(part.from), sharper);
     let centre = best.u - spine.u[part.element];
     let (low, high) = ((centre - step).max(part.from), (centre + step).min(part.to));
     sharper(best, radius(golden_section(|x| radius(x).value, low, high)))
 }
 
-fn tightest_on_rib(spine: &Spine, board: &Board, element: usize, distance: f64) -> BendRadius {
+fn tightest_on_rib(spine: &Spine, board: &Board, element: usize, distance: f64) -> Extreme {
     let (bend, slope) = spine.fields(element, distance);
     let s = spine.convergence(element, slope);
     let [minus, plus] = board.ends(&board.foot_within(spine, element, distance));
@@ -242,7 +263,7 @@ fn tightest_on_rib(spine: &Spine, board: &Board, element: usize, distance: f64) 
     } else {
         0.0
     };
-    BendRadius {
+    Extreme {
         value: bend_radius(curvature(bend, slope), s, v),
         u: spine.u[element] + distance,
         v,
@@ -375,7 +396,7 @@ mod tests {
         // Ribs through the apex (y, z) = (0.5, 0.2): β = (u − 0.5)/0.2, s = 5, away from the ends.
         let cone = |u: f64| 2.0 / (1.0 + ((u - 0.5) / 0.2).powi(2)).powf(1.5);
         let spine = spine(1.0, 0.1, 2000, cone, |u| (u - 0.5) / 0.2);
-        let least = least_bend_radius(&spine).unwrap_or(BendRadius {
+        let least = least_bend_radius(&spine).unwrap_or(Extreme {
             value: 0.0,
             u: 0.0,
             v: 0.0,

@@ -5,7 +5,6 @@
 //! out in [`crate::board`].
 
 mod curvature;
-mod curved;
 mod distribution;
 mod extremes;
 pub mod linking;
@@ -14,6 +13,7 @@ mod mesh;
 mod patch;
 mod rib;
 mod self_crossing;
+mod thick;
 
 pub use curvature::*;
 pub use distribution::*;
@@ -21,6 +21,7 @@ pub use extremes::*;
 pub use mesh::*;
 pub use rib::*;
 pub use self_crossing::*;
+pub use thick::{PointStrain, Strain, StrainExtremes, strain, strain_at};
 
 #[cfg(test)]
 mod tests;

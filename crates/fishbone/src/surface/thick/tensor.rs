@@ -1,0 +1,73 @@
+//! Symmetric tensors of the board's plane: curvature and strain.
+
+use std::ops::{Add, Mul};
+
+/// A symmetric tensor at a point of the flat board, in its axes there: u along the spine, v across.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct BoardTensor {
+    /// Along u.
+    pub(super) uu: f64,
+    /// The mixed component, half of an angle if it is a strain.
+    pub(super) uv: f64,
+    /// Across, along v.
+    pub(super) vv: f64,
+}
+
+impl BoardTensor {
+    /// Magnitude of the principal value of larger magnitude.
+    pub(super) fn largest(&self) -> f64 {
+        let mean = 0.5 * (self.uu + self.vv);
+        mean.abs() + self.uv.hypot(0.5 * (self.uu - self.vv))
+    }
+
+    /// The product of both principal values.
+    pub(super) fn determinant(&self) -> f64 {
+        self.uu * self.vv - self.uv * self.uv
+    }
+
+    /// The tensor in axes turned by an angle from u towards v.
+    pub(super) fn turned(&self, angle: f64) -> Self {
+        let (sine, cosine) = angle.sin_cos();
+        let (s2, c2, sc) = (sine * sine, cosine * cosine, sine * cosine);
+        Self {
+            uu: c2 * self.uu + 2.0 * sc * self.uv + s2 * self.vv,
+            uv: sc * (self.vv - self.uu) + (c2 - s2) * self.uv,
+            vv: s2 * self.uu - 2.0 * sc * self.uv + c2 * self.vv,
+        }
+    }
+
+    /// The tensor a share of the way to another.
+    pub(super) fn towards(self, other: Self, share: f64) -> Self {
+        self * (1.0 - share) + other * share
+    }
+}
+
+impl From<BoardTensor> for [f64; 3] {
+    fn from(tensor: BoardTensor) -> Self {
+        [tensor.uu, tensor.uv, tensor.vv]
+    }
+}
+
+impl Add for BoardTensor {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            uu: self.uu + other.uu,
+            uv: self.uv + other.uv,
+            vv: self.vv + other.vv,
+        }
+    }
+}
+
+impl Mul<f64> for BoardTensor {
+    type Output = Self;
+
+    fn mul(self, factor: f64) -> Self {
+        Self {
+            uu: self.uu * factor,
+            uv: self.uv * factor,
+            vv: self.vv * factor,
+        }
+    }
+}
