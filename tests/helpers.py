@@ -400,6 +400,33 @@ def shell_scenario(name: str, energy: Energy) -> Json:
     )
 
 
+THICKNESS = 7e-4
+"""Thickness of the sheet in the source's experiment, in U."""
+
+
+def thick(scenario: Json, thickness: float = THICKNESS, poisson: float = 0.34) -> Json:
+    """The scenario with a thickness, and the energy that knows it."""
+    return {**scenario, "energy": "shell", "belt": {**scenario["belt"], "thickness": thickness, "poisson": poisson}}
+
+
+def thick_shell_scenario(name: str) -> Json:
+    """The strip of finite thickness of a shell reference, on the shell's side."""
+    data = shell(name)
+    segments = [
+        arc(length, k) if k else straight(length) for length, k in data.get("segments", [[data["length"], 0.0]])
+    ]
+    highest = max(data["position"], key=lambda point: abs(point[0]))
+    end = support("end", data["end_position"], rotation_vector(np.array(data["end_rotation_matrix"])))
+    belt = board(
+        segments,
+        [support("start", ORIGIN, ORIGIN), end],
+        width=data["width"],
+        rigidity=data["rigidity"],
+        bulge=(math.copysign(1.0, highest[0]), 0.0, 0.0),
+    )
+    return thick(belt, data["thickness"], data["poisson"])
+
+
 def rms_distance(a: Array, b: Array) -> float:
     """Root of the mean squared distance of corresponding points.
 

@@ -6,7 +6,6 @@ The shells are an independent finite-element computation (data/README.md).
 from __future__ import annotations
 
 import itertools
-import math
 
 import numpy as np
 import pytest
@@ -16,8 +15,6 @@ import fishbone as fb
 from helpers import (
     ORIGIN,
     Array,
-    Json,
-    arc,
     board,
     clamped,
     example1,
@@ -30,6 +27,8 @@ from helpers import (
     spine_at,
     straight,
     support,
+    thick,
+    thick_shell_scenario,
 )
 
 DISTANCES = {
@@ -48,38 +47,13 @@ DISTANCES = {
     "rounded_corner_h8": 0.2e-3,
 }
 """Largest RMS distance of the centre line to the shell's, in U."""
-THICKNESS = 7e-4
-"""Thickness of the sheet in the source's experiment, in U."""
 
 shells = pytest.mark.parametrize("name", DISTANCES)
 
 
-def thick(scenario: Json, thickness: float = THICKNESS, poisson: float = 0.34) -> Json:
-    """The scenario with a thickness, and the energy that knows it."""
-    return {**scenario, "energy": "shell", "belt": {**scenario["belt"], "thickness": thickness, "poisson": poisson}}
-
-
-def scenario_of(name: str) -> Json:
-    """The belt of a shell, on the shell's side."""
-    data = shell(name)
-    segments = [
-        arc(length, k) if k else straight(length) for length, k in data.get("segments", [[data["length"], 0.0]])
-    ]
-    highest = max(data["position"], key=lambda point: abs(point[0]))
-    end = support("end", data["end_position"], rotation_vector(np.array(data["end_rotation_matrix"])))
-    belt = board(
-        segments,
-        [support("start", ORIGIN, ORIGIN), end],
-        width=data["width"],
-        rigidity=data["rigidity"],
-        bulge=(math.copysign(1.0, highest[0]), 0.0, 0.0),
-    )
-    return thick(belt, data["thickness"], data["poisson"])
-
-
 def distance(name: str) -> float:
     data = shell(name)
-    return rms_distance(spine_at(solve(scenario_of(name)), data["u"]), np.array(data["position"]))
+    return rms_distance(spine_at(solve(thick_shell_scenario(name)), data["u"]), np.array(data["position"]))
 
 
 @shells
@@ -94,12 +68,12 @@ def test_centre_lines_are_a_quarter_of_a_thousandth_off_on_average() -> None:
 @shells
 def test_energy_is_that_of_the_shell(name: str) -> None:
     """Within 0.6 %; the energy of the inextensible belt is 1 to 11 % higher."""
-    assert solve(scenario_of(name)).energy == pytest.approx(shell(name)["energy"], rel=6e-3)
+    assert solve(thick_shell_scenario(name)).energy == pytest.approx(shell(name)["energy"], rel=6e-3)
 
 
 @shells
 def test_equilibrium_is_no_saddle_and_its_error_is_small(name: str) -> None:
-    found = solve(scenario_of(name))
+    found = solve(thick_shell_scenario(name))
     assert found.stable is not False
     assert found.error is not None
     assert found.error.energy <= 1e-3
@@ -110,7 +84,7 @@ def test_equilibrium_is_no_saddle_and_its_error_is_small(name: str) -> None:
 def test_edges_are_those_of_the_shell(name: str) -> None:
     """Material points of both edges: the ribs are curved, and the whole surface is that of the shell to 2e-3 U."""
     data = shell(name)
-    found = solve(scenario_of(name))
+    found = solve(thick_shell_scenario(name))
     for edge, v in (("edge_minus", -0.5 * data["width"]), ("edge_plus", 0.5 * data["width"])):
         flat = np.column_stack([data["u"], np.full(len(data["u"]), v)])
         assert rms_distance(found.material_points(flat), np.array(data[edge])) <= 2e-3
@@ -118,7 +92,7 @@ def test_edges_are_those_of_the_shell(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["example1", "example2_h4", "offset10_far"])
 def test_meshes_of_80_and_320_elements_agree(name: str) -> None:
-    coarse, fine = (solve({**scenario_of(name), "solver": {"elements": n}}) for n in (80, 320))
+    coarse, fine = (solve({**thick_shell_scenario(name), "solver": {"elements": n}}) for n in (80, 320))
     assert coarse.energy == pytest.approx(fine.energy, rel=1e-3)
     places = np.linspace(0.0, 1.0, 41)
     assert rms_distance(spine_at(coarse, places), spine_at(fine, places)) <= 1e-4

@@ -12,6 +12,7 @@ from fishbone._core import __version__
 from fishbone.branches import branches
 from fishbone.equilibrium import (
     AreaRadii,
+    AreaStrains,
     BendRadii,
     BendRadius,
     Edges,
@@ -21,11 +22,14 @@ from fishbone.equilibrium import (
     MeshError,
     Mode,
     Outline,
+    PointStrain,
     Reaction,
     Residuals,
     RibMargin,
     SnapMargin,
     SpineRadius,
+    Strain,
+    StrainExtremes,
     solve,
     solve_many,
 )
@@ -50,6 +54,7 @@ from fishbone.tracker import Tracker, Update
 
 __all__ = [
     "AreaRadii",
+    "AreaStrains",
     "BendRadii",
     "BendRadius",
     "Branch",
@@ -77,6 +82,7 @@ __all__ = [
     "NotConverged",
     "Origin",
     "Outline",
+    "PointStrain",
     "Poses",
     "Reaction",
     "Residuals",
@@ -85,6 +91,8 @@ __all__ = [
     "Sensitivity",
     "SnapMargin",
     "SpineRadius",
+    "Strain",
+    "StrainExtremes",
     "Tracker",
     "Update",
     "__version__",

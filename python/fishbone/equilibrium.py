@@ -149,7 +149,10 @@ class HighestPoint(NamedTuple):
 
 
 class BendRadius(NamedTuple):
-    """The least bend radius over the whole width, and its place: u along the spine, v across."""
+    """The least bend radius over the whole width, and its place: u along the spine, v across.
+
+    Where ribs are straight, u is that of the foot of its rib.
+    """
 
     value: float
     u: float
@@ -178,6 +181,47 @@ class BendRadii(NamedTuple):
     """The least bend radius on the spine; None where nothing bends."""
     area: AreaRadii
     """The bend radii exceeded on given shares of the area."""
+
+
+class AreaStrains(NamedTuple):
+    """The strains not exceeded on 99.9, 99 and 95 % of the board's area, stiffeners included."""
+
+    p999: float
+    p99: float
+    p95: float
+
+
+class StrainExtremes(NamedTuple):
+    """A strain over the board, at a point the larger magnitude of both principal strains; dimensionless."""
+
+    value: float
+    """The largest at least V/5 away from clamps, as for `least_bend_radius`; NaN where no part is so far from them."""
+    u: float
+    """Its place along the spine."""
+    v: float
+    """Its place across, square to the spine in the flat board."""
+    area: AreaStrains
+    """The strains not exceeded on given shares of the area, beside clamps too."""
+
+
+class Strain(NamedTuple):
+    """The strain of a strip of finite thickness."""
+
+    membrane: StrainExtremes
+    """Strain of the middle plane; of layers, that of their neutral surface."""
+    layers: list[StrainExtremes]
+    """Strain of the layers from bottom (−ξ) to top, the larger one of both faces; a plain sheet is one layer."""
+
+
+class PointStrain(NamedTuple):
+    """Curvature and strain at m points of the board, symmetric tensors by axes along the spine and across it."""
+
+    curvature: Floats
+    """Curvature: the second fundamental form by the normal ξ, along a straight spine −ω_ζ, shape (m, 2, 2)."""
+    membrane: Floats
+    """Strain of the middle plane; the mixed component is half of the angle, shape (m, 2, 2)."""
+    layers: Floats
+    """Largest magnitude of a principal strain on both faces of each layer, bottom (−ξ) to top, shape (m, layers)."""
 
 
 class RibMargin(NamedTuple):
@@ -406,8 +450,13 @@ class Equilibrium:
     def least_bend_radius(self) -> BendRadius | None:
         """The least bend radius of the whole belt, often at an edge; None where nothing bends.
 
-        The radius falls with every refinement of the mesh, because ribs all but meet on an edge where the bend changes
-        sign. `bend_radius` converges.
+        The radius of developable belts falls with every refinement of the mesh, because ribs all but meet on an edge
+        where the bend changes sign. `bend_radius` converges.
+
+        With `energy = "shell"` it converges. It is the least at least V/5 away from clamps: from both ends (of a closed
+        belt, from its seam), stiffeners, corners, and places where the bend may jump, as at supports that hold a
+        rotation. Nearer, at a clamp's corners, a sheet is bent far more, and the model does not know it. None also
+        where no part of the board is so far from clamps.
         """
         least = self._inner.least_bend_radius
         return None if least is None else BendRadius(*least)
@@ -434,6 +483,31 @@ class Equilibrium:
         if not (np.ndim(radius) == 0 and 0.0 < radius < math.inf):
             raise InvalidArgument(f"radius: found {radius!r}, allowed a positive finite number")
         return self._inner.area_below(radius)
+
+    @property
+    def strain(self) -> Strain | None:
+        """The strain of the middle plane and of every layer; None unless the energy is "shell"."""
+        strain = self._inner.strain
+        if strain is None:
+            return None
+        membrane, *layers = (StrainExtremes(*largest, AreaStrains(*area)) for largest, area in (strain[0], *strain[1]))
+        return Strain(membrane, layers)
+
+    def strain_at(self, places: npt.ArrayLike) -> PointStrain | None:
+        """Curvature and strain at places (u, v) of the flat board, u along the spine and v square to it.
+
+        None unless the energy is "shell". Stiffeners have none; NaN off the board. Nearer than V/5 to a clamp the
+        values have not been compared with shells.
+
+        Shapes: (m, 2).
+        Errors: `InvalidArgument` for another shape.
+        """
+        found = self._inner.strain_at(_flat_points("places", places))
+        if found is None:
+            return None
+        tensors = np.array([[0, 1], [1, 2]])
+        curvature, membrane, layers = found
+        return PointStrain(curvature[:, tensors], membrane[:, tensors], layers)
 
     @property
     def rib_margin(self) -> RibMargin:
@@ -600,7 +674,7 @@ class Equilibrium:
         Shapes: (m, 2) to (m, 3).
         Errors: `InvalidArgument` for another shape.
         """
-        return self._inner.material_points(_flat_points(flat))
+        return self._inner.material_points(_flat_points("flat", flat))
 
     def rib_feet(self, flat: npt.ArrayLike) -> Floats:
         """Arc length u of the ribs through points (y, z) of the flat board; NaN for points off the board.
@@ -608,7 +682,7 @@ class Equilibrium:
         Shapes: (m, 2) to (m,).
         Errors: `InvalidArgument` for another shape.
         """
-        return self._inner.rib_feet(_flat_points(flat))
+        return self._inner.rib_feet(_flat_points("flat", flat))
 
     @property
     def stiffeners(self) -> list[tuple[float, float]]:
@@ -706,9 +780,9 @@ def _direction(direction: npt.ArrayLike) -> list[float]:
     return numbers
 
 
-def _flat_points(flat: npt.ArrayLike) -> list[list[float]]:
-    points = np.asarray(flat, dtype=np.float64)
+def _flat_points(name: str, of: npt.ArrayLike) -> list[list[float]]:
+    points = np.asarray(of, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] != 2:  # noqa: PLR2004 - (y, z)
-        raise InvalidArgument(f"flat: found an array of shape {points.shape}, allowed (m, 2)")
+        raise InvalidArgument(f"{name}: found an array of shape {points.shape}, allowed (m, 2)")
     rows: list[list[float]] = points.tolist()
     return rows

@@ -36,6 +36,8 @@ ENDS: dict[End, str] = {
 """The printed reason of the end of a branch that does not end with the path."""
 NOUGHT = 1e-9
 """Largest rounding error of a rib angle [degrees]."""
+PER_CENT = 100.0
+"""Per cent in the whole, a number."""
 SIDE = {1: "along solver.bulge", 0: "neither along solver.bulge nor against it", -1: "against solver.bulge"}
 """The side to which a belt bulges."""
 UNDETERMINED = "not determined"
@@ -266,10 +268,28 @@ def _extremes(equilibrium: Equilibrium) -> Iterator[tuple[str, str, str]]:
         yield "least bend radius, on the spine", number(on_spine.value), f"{length}at u = {number(on_spine.u)}"
     if math.isfinite(over_area.p99):
         yield "bend radius, 99 % of the area", number(over_area.p99), f"{length}or more"
+    yield from _strains(equilibrium, length)
     angle = np.degrees(equilibrium.rib_angle)
     angle[np.abs(angle) < NOUGHT] = 0.0
     largest = int(np.argmax(np.abs(angle)))
     yield "largest rib angle", number(abs(angle[largest])), f"degrees, at u = {number(equilibrium.u[largest])}"
+
+
+def _strains(equilibrium: Equilibrium, length: str) -> Iterator[tuple[str, str, str]]:
+    """Extremes of a strip of finite thickness, V/5 or more from clamps, and the strains of its layers over the area."""
+    strain, least = equilibrium.strain, equilibrium.least_bend_radius
+    if strain is None:
+        return
+    if least is not None:
+        where = f"{length}at u = {number(least.u)}, v = {number(least.v)}"
+        yield "least bend radius, V/5 off clamps", number(least.value), where
+    count = len(strain.layers)
+    for index, layer in enumerate(strain.layers, start=1):
+        name = "faces" if count == 1 else f"layer {index} of {count}"
+        if not math.isnan(layer.value):
+            where = f"%, at u = {number(layer.u)}, v = {number(layer.v)}"
+            yield f"largest strain, {name}, V/5 off clamps", number(PER_CENT * layer.value), where
+        yield f"strain, {name}, 99 % of the area", number(PER_CENT * layer.area.p99), "%, or less"
 
 
 def _crossing(places: tuple[float, float] | None) -> tuple[str, str]:

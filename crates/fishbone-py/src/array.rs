@@ -46,6 +46,21 @@ pub(crate) fn flat_points(
     Array2::from(rows).into_pyarray(py)
 }
 
+/// Rows of one length.
+///
+/// Shapes: (n, length).
+pub(crate) fn rows<'a, 'py>(
+    py: Python<'py>,
+    rows: impl ExactSizeIterator<Item = &'a [f64]>,
+) -> PyResult<Points<'py>> {
+    let count = rows.len();
+    let flat: Vec<f64> = rows.flatten().copied().collect();
+    let shape = (count, flat.len().checked_div(count).unwrap_or(0));
+    let array = Array2::from_shape_vec(shape, flat)
+        .map_err(|error| PyRuntimeError::new_err(error.to_string()))?;
+    Ok(array.into_pyarray(py))
+}
+
 /// Shapes: (n, 2, 2).
 pub(crate) fn pairs(py: Python<'_>, rows: Vec<[[f64; 2]; 2]>) -> Grid<'_> {
     Array3::from(rows).into_pyarray(py)

@@ -12,7 +12,7 @@ use fishbone::geometry::Wrench;
 use fishbone::names::Named;
 use fishbone::problem::Problem;
 use fishbone::strip::spine::Piece;
-use fishbone::surface::{self, Rib};
+use fishbone::surface::{self, PointStrain, Rib};
 use nalgebra::{Vector2, Vector3, Vector6};
 use numpy::IntoPyArray;
 use pyo3::prelude::*;
@@ -55,6 +55,15 @@ type Margin = (f64, [f64; 6], bool, [f64; 3], [f64; 3], bool);
 
 /// Eigenvalue, translation, rotation, bend and rib slope.
 type Mode<'py> = (f64, Points<'py>, Points<'py>, Scalars<'py>, Scalars<'py>);
+
+/// (value, u, v) of the largest strain, NaN where there is none, and the strains not exceeded on 99.9, 99 and 95 % of the area.
+type StrainExtremes = ([f64; 3], [f64; 3]);
+
+fn extremes(strain: &surface::StrainExtremes) -> StrainExtremes {
+    let largest = strain.largest;
+    let largest = largest.map_or([f64::NAN; 3], |at| [at.value, at.u, at.v]);
+    (largest, strain.area)
+}
 
 /// The outcome of a solve.
 #[pyclass(frozen, module = "fishbone._core")]
@@ -283,6 +292,38 @@ impl Equilibrium {
     /// Share of the area with a radius below a finite one.
     fn area_below(&self, radius: f64) -> f64 {
         surface::BendDistribution::of(&self.solved.spine).share_below(radius)
+    }
+
+    /// Of the middle plane and of every layer; None of a belt of no thickness. Found with the GIL released.
+    #[getter]
+    fn strain(&self, py: Python<'_>) -> Option<(StrainExtremes, Vec<StrainExtremes>)> {
+        let strain = py.detach(|| surface::strain(&self.solved.spine))?;
+        let layers = strain.layers.iter().map(extremes);
+        Some((extremes(&strain.membrane), layers.collect()))
+    }
+
+    /// Curvature and strain of the middle plane (uu, uv, vv), and strain of the layers, at points (u, v) of the board; NaN off
+    /// the board, None of a belt of no thickness.
+    ///
+    /// Shapes: (m, 2) to (m, 3), (m, 3), (m, layers).
+    fn strain_at<'py>(
+        &self,
+        py: Python<'py>,
+        points: Vec<[f64; 2]>,
+    ) -> PyResult<Option<[Points<'py>; 3]>> {
+        let spine = &self.solved.spine;
+        let Some(found) = py.detach(|| surface::strain_at(spine, &points)) else {
+            return Ok(None);
+        };
+        let tensors = |tensor: fn(&PointStrain) -> [f64; 3]| {
+            let rows: Vec<Vector3<f64>> = found.iter().map(|at| tensor(at).into()).collect();
+            array::points(py, &rows)
+        };
+        Ok(Some([
+            tensors(|at| at.curvature),
+            tensors(|at| at.membrane),
+            array::rows(py, found.iter().map(|at| &at.layers[..]))?,
+        ]))
     }
 
     /// (value, u).

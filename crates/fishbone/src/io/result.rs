@@ -42,6 +42,7 @@ pub(crate) struct Record<'a> {
     least_bend_radius: LeastBendRadius,
     least_spine_radius: LeastSpineRadius,
     bend_radius: BendRadius,
+    strain: Option<Strain>,
     rib_margin: RibMargin,
     crosses_itself: Option<[f64; 2]>,
     twist: f64,
@@ -112,15 +113,31 @@ struct LeastSpineRadius {
 #[derive(Debug, Clone, Serialize)]
 struct BendRadius {
     spine: LeastSpineRadius,
-    area: AreaRadii,
+    area: Area,
 }
 
-/// Radii exceeded on 99.9, 99 and 95 % of the board's area.
+/// Radii exceeded, or strains not exceeded, on 99.9, 99 and 95 % of the board's area.
 #[derive(Debug, Clone, Serialize)]
-struct AreaRadii {
+struct Area {
     p999: Option<f64>,
     p99: Option<f64>,
     p95: Option<f64>,
+}
+
+/// Null of a belt of no thickness.
+#[derive(Debug, Clone, Serialize)]
+struct Strain {
+    membrane: StrainExtremes,
+    layers: Vec<StrainExtremes>,
+}
+
+/// All but the area's null where no part of the board is far enough from clamps.
+#[derive(Debug, Clone, Serialize)]
+struct StrainExtremes {
+    value: Option<f64>,
+    u: Option<f64>,
+    v: Option<f64>,
+    area: Area,
 }
 
 #[derive(Debug, Clone, Serialize)]
@@ -201,8 +218,9 @@ impl<'a> Record<'a> {
             least_spine_radius: LeastSpineRadius::new(spine_radius),
             bend_radius: BendRadius {
                 spine: LeastSpineRadius::new(spine_radius),
-                area: AreaRadii::new(&surface::BendDistribution::of(spine)),
+                area: Area::new(surface::BendDistribution::of(spine).quantiles()),
             },
+            strain: surface::strain(spine).map(|strain| Strain::new(&strain)),
             rib_margin: RibMargin {
                 value: margin.value,
                 u: margin.u,
@@ -272,11 +290,31 @@ impl LeastSpineRadius {
     }
 }
 
-impl AreaRadii {
-    fn new(distribution: &surface::BendDistribution) -> Self {
-        let finite = |radius: f64| radius.is_finite().then_some(radius);
-        let [p999, p99, p95] = distribution.quantiles().map(finite);
+impl Area {
+    fn new(quantiles: [f64; 3]) -> Self {
+        let finite = |value: f64| value.is_finite().then_some(value);
+        let [p999, p99, p95] = quantiles.map(finite);
         Self { p999, p99, p95 }
+    }
+}
+
+impl Strain {
+    fn new(strain: &surface::Strain) -> Self {
+        Self {
+            membrane: StrainExtremes::new(&strain.membrane),
+            layers: strain.layers.iter().map(StrainExtremes::new).collect(),
+        }
+    }
+}
+
+impl StrainExtremes {
+    fn new(strain: &surface::StrainExtremes) -> Self {
+        Self {
+            value: strain.largest.map(|largest| largest.value),
+            u: strain.largest.map(|largest| largest.u),
+            v: strain.largest.map(|largest| largest.v),
+            area: Area::new(strain.area),
+        }
     }
 }
 

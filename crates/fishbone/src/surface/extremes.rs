@@ -202,9 +202,10 @@ const SAMPLES: usize = 8;
 /// The tightest point of a straight rib is the end towards which the ribs converge.
 ///
 /// Of a strip of finite thickness the radius converges with the mesh: it is that of the whole board, the layers along its free
-/// edges included, at least V/5 away from ends of the board, stiffeners, corners and places where the bend may jump, as at
-/// supports; nearer, the radius of a sheet at a clamp's corners has no lower bound but its thickness. `None` also where no
-/// part of the board is so far from them.
+/// edges included, at least V/5 away from clamps: from both ends of the board (of a closed belt, from its seam), from
+/// stiffeners and corners, and from places where the bend may jump, as at supports that hold a frame. Nearer, at the corners of
+/// a clamp, the curvature of a sheet is far larger, and the model does not know it. `None` also where no part of the board is so
+/// far from clamps.
 pub fn least_bend_radius(spine: &Spine) -> Option<Extreme> {
     if let Some(board) = ThickBoard::of(spine) {
         return board.least_radius();

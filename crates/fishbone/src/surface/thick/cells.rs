@@ -22,6 +22,8 @@ const REACHED: f64 = 1e-9;
 pub(super) struct Cells {
     /// Arc length at which the stretch starts.
     pub(super) start: f64,
+    /// Arc length at which it ends.
+    pub(super) end: f64,
     /// Length of a cell.
     pub(super) length: f64,
     /// Element that holds the middle of each cell.
@@ -47,6 +49,7 @@ impl Cells {
         let elements = (0..count as usize).map(element).collect();
         Self {
             start,
+            end,
             length,
             elements,
         }
@@ -57,9 +60,9 @@ impl Cells {
         self.elements.len()
     }
 
-    /// Arc length at the end of the stretch.
-    pub(super) fn end(&self) -> f64 {
-        self.start + self.count() as f64 * self.length
+    /// Whether an arc length lies on the stretch.
+    pub(super) fn holds(&self, u: f64) -> bool {
+        (self.start..=self.end).contains(&u)
     }
 
     /// Arc length at the middle of a cell.

@@ -40,6 +40,9 @@ const PARTS: usize = 3;
 /// Distance from ends, stiffeners, corners and joints of the board from which on extremes are given, in widths.
 const CLEAR: f64 = 0.2;
 
+/// Rounding of a place, in lengths of the board.
+const ROUNDING: f64 = 1e-9;
+
 /// The bent board of a strip of finite thickness: its curvature and the strain of its middle plane.
 #[derive(Debug, Clone)]
 pub(super) struct ThickBoard {
@@ -48,8 +51,8 @@ pub(super) struct ThickBoard {
     width: f64,
     /// Area of the board, stiffeners included.
     area: f64,
-    /// Curvature up to which the board is flat.
-    flat: f64,
+    /// Length of the board along its spine.
+    length: f64,
     /// Heights of the faces of its layers above the neutral surface, from bottom to top.
     faces: Vec<f64>,
 }
@@ -82,7 +85,7 @@ impl ThickBoard {
             rows,
             width: spine.width,
             area: outline(spine).area(),
-            flat: FLAT / spine.length(),
+            length: spine.length(),
             faces: curved.faces.clone(),
         })
     }
@@ -91,7 +94,7 @@ impl ThickBoard {
     /// far from them.
     pub(super) fn least_radius(&self) -> Option<Extreme> {
         let peak = self.peak(|_, b, _| b.largest())?;
-        (peak.value > self.flat).then(|| Extreme {
+        (peak.value > self.flat()).then(|| Extreme {
             value: 1.0 / peak.value,
             ..peak
         })
@@ -99,26 +102,42 @@ impl ThickBoard {
 
     /// The bend by the area on which it is exceeded; 0 where it is rounding of a solve.
     pub(super) fn bends(&self) -> Shares {
-        self.shares(|_, b, _| {
-            Some(b.largest())
-                .filter(|bend| *bend > self.flat)
-                .unwrap_or(0.0)
-        })
+        let flat = self.flat();
+        self.shares(|_, b, _| Some(b.largest()).filter(|bend| *bend > flat).unwrap_or(0.0))
     }
 
-    /// Curvature, strain of the middle plane and sheet at a point of the board; `None` off it and on stiffeners.
-    fn at(&self, u: f64, v: f64) -> Option<(BoardTensor, BoardTensor, &Sheet)> {
-        if v.abs() > 0.5 * self.width {
-            return None;
-        }
-        let holds = |stretch: &&Stretch| stretch.cells.start <= u && u <= stretch.cells.end();
-        let stretch = self.stretches.iter().find(holds)?;
+    /// Curvature up to which the board is flat.
+    fn flat(&self) -> f64 {
+        FLAT / self.length
+    }
+
+    /// Sheet, curvature and strain of the middle plane at a point of the board, both none on stiffeners; `None` off the board.
+    fn at(&self, u: f64, v: f64) -> Option<(&Sheet, BoardTensor, BoardTensor)> {
+        let rounding = ROUNDING * self.length;
+        let is_on_board = v.abs() <= 0.5 * self.width + rounding
+            && (-rounding..=self.length + rounding).contains(&u);
+        let holds = |stretch: &&Stretch| stretch.cells.holds(u.clamp(0.0, self.length));
+        let stretch = self.stretches.iter().find(holds);
+        let none = (
+            &Sheet::RIGID,
+            BoardTensor::default(),
+            BoardTensor::default(),
+        );
+        is_on_board.then(|| stretch.map_or(none, |stretch| self.at_of(stretch, u, v)))
+    }
+
+    fn at_of<'a>(
+        &self,
+        stretch: &'a Stretch,
+        u: f64,
+        v: f64,
+    ) -> (&'a Sheet, BoardTensor, BoardTensor) {
         let (row, share) = self.rows.around(2.0 * v / self.width);
         let [b, e] = [&stretch.curvature, &stretch.membrane].map(|field| {
             let [below, above] = [row, row + 1].map(|row| stretch.at(field, u, row));
             below.towards(above, share)
         });
-        Some((b, e, stretch.sheet_at(u)))
+        (stretch.sheet_at(u), b, e)
     }
 
     /// The largest of a value of sheet, curvature and membrane strain, as far from ends as extremes are given.
@@ -236,9 +255,6 @@ impl Stretch {
 
     /// Middles of cells at least a distance from ends and joints of the stretch, and the places at just that distance.
     fn clear_of_breaks(&self, distance: f64) -> impl Iterator<Item = f64> {
-        /// Rounding of an arc length at just that distance, in distances.
-        const ROUNDING: f64 = 1e-9;
-        let (start, end) = (self.cells.start, self.cells.end());
         let middles = (0..self.cells.count()).map(|cell| self.cells.middle(cell));
         let beside = self
             .breaks
@@ -247,13 +263,13 @@ impl Stretch {
         let least = distance * (1.0 - ROUNDING);
         let is_clear = move |u: &f64| self.breaks.iter().all(|at| (u - at).abs() >= least);
         let places = beside.chain(middles);
-        places.filter(move |u| (start..=end).contains(u) && is_clear(u))
+        places.filter(move |u| self.cells.holds(*u) && is_clear(u))
     }
 }
 
 /// Arc lengths of the ends of a stretch and of the joints between them.
 fn breaks(spine: &Spine, cells: &Cells) -> Vec<f64> {
-    let (start, end) = (cells.start, cells.end());
+    let &Cells { start, end, .. } = cells;
     let pieces = spine.pieces.iter().zip(&spine.u);
     let joints = pieces.filter(|(piece, _)| matches!(piece, Piece::Joint { .. }));
     let inside = joints.map(|(_, u)| *u).filter(|u| start < *u && *u < end);

@@ -20,8 +20,8 @@ pub struct Strain {
 /// A strain over the area of the board.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StrainExtremes {
-    /// The largest with its place, at least V/5 away from ends of the board, stiffeners, corners and places where the bend may
-    /// jump, as at supports; `None` where no part of the board is so far from them.
+    /// The largest with its place, as far from clamps as [`least_bend_radius`](crate::surface::least_bend_radius); `None` where
+    /// no part of the board is so far from them.
     pub largest: Option<Extreme>,
     /// Strains not exceeded on 99.9, 99 and 95 % of the board's area, stiffeners included.
     pub area: [f64; 3],
@@ -49,11 +49,16 @@ pub fn strain(spine: &Spine) -> Option<Strain> {
 }
 
 /// Curvature and strain at points (u, v) of the flat board of a strip of finite thickness, u along its spine and v square to it;
-/// `None` of any other belt, and of a point off the board or on a stiffener.
-pub fn strain_at(spine: &Spine, points: &[[f64; 2]]) -> Option<Vec<Option<PointStrain>>> {
+/// `None` of any other belt. Stiffeners have none; NaN off the board.
+pub fn strain_at(spine: &Spine, points: &[[f64; 2]]) -> Option<Vec<PointStrain>> {
     let board = ThickBoard::of(spine)?;
+    let off_board = PointStrain {
+        curvature: [f64::NAN; 3],
+        membrane: [f64::NAN; 3],
+        layers: vec![f64::NAN; board.faces.len() - 1],
+    };
     let at = |&[u, v]: &[f64; 2]| {
-        let (b, membrane, sheet) = board.at(u, v)?;
+        let (sheet, b, membrane) = board.at(u, v)?;
         let layer = |faces: &[f64]| on_faces(faces, sheet, &b, &membrane);
         Some(PointStrain {
             curvature: b.into(),
@@ -61,6 +66,7 @@ pub fn strain_at(spine: &Spine, points: &[[f64; 2]]) -> Option<Vec<Option<PointS
             layers: board.faces.windows(2).map(layer).collect(),
         })
     };
+    let at = |point| at(point).unwrap_or_else(|| off_board.clone());
     Some(points.iter().map(at).collect())
 }
 

@@ -46,7 +46,7 @@ fn radius_quantiles(spine: &Spine) -> [f64; 3] {
 
 /// The curvature at a point.
 fn curvature(spine: &Spine, u: f64, v: f64) -> BoardTensor {
-    ThickBoard::of(spine).unwrap().at(u, v).unwrap().0
+    ThickBoard::of(spine).unwrap().at(u, v).unwrap().1
 }
 
 #[test]
@@ -92,19 +92,14 @@ fn test_a_bent_board_curls_at_its_edges_until_no_moment_acts_across() {
     // The layer's strain along the edge is ν h/(2 R √(3(1−ν²))), that of the bend is h/(2 R).
     let expected = nu * 1e-4 * bend / (3.0 * (1.0 - nu * nu)).sqrt();
     let at = |u: f64, v: f64| strain_at(&arch, &[[u, v]]).unwrap().remove(0);
-    assert_relative_eq!(
-        at(0.5, 0.05).unwrap().membrane[0],
-        expected,
-        max_relative = 1e-5
-    );
+    assert_relative_eq!(at(0.5, 0.05).membrane[0], expected, max_relative = 1e-5);
     let face = strain(&arch).unwrap().layers[0].largest.unwrap();
     assert_relative_eq!(face.value, expected + 1e-4 * bend, max_relative = 1e-5);
     assert_eq!(face.v.abs(), 0.05);
-    assert_eq!(at(face.u, face.v).unwrap().layers, [face.value]);
-    assert_eq!(
-        [at(0.5, 0.0501), at(1.0001, 0.0), at(-0.0001, 0.0)],
-        [None, None, None]
-    );
+    assert_eq!(at(face.u, face.v).layers, [face.value]);
+    for off in [at(0.5, 0.0501), at(1.0001, 0.0), at(-0.0001, 0.0)] {
+        assert!(off.curvature[0].is_nan() && off.layers[0].is_nan());
+    }
 }
 
 #[test]
@@ -193,7 +188,11 @@ fn test_stiffeners_are_flat_and_part_the_board() {
     assert_relative_eq!(q999, 0.2, max_relative = 1e-10);
     assert_relative_eq!(q99, 0.2, max_relative = 1e-10);
     assert_eq!(q95, f64::INFINITY);
-    assert_eq!(strain_at(&belt, &[[0.5, 0.0]]), Some(vec![None]));
+    let stiffener = strain_at(&belt, &[[0.5, 0.0]]).unwrap().remove(0);
+    assert_eq!(
+        (stiffener.curvature, stiffener.membrane, stiffener.layers),
+        ([0.0; 3], [0.0; 3], vec![0.0])
+    );
     // It has no part that is clear of clamps.
     assert_eq!(least_bend_radius(&belt), None);
     let strain = strain(&belt).unwrap().layers[0];
