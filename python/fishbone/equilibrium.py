@@ -274,7 +274,7 @@ class Equilibrium:
 
     @property
     def energy_model(self) -> EnergyModel:
-        """The energy minimised: "fishbone", "sadowsky" or "wunderlich"."""
+        """The energy minimised: "fishbone", "sadowsky", "wunderlich" or "shell"."""
         return self._inner.energy_model
 
     @property
@@ -490,8 +490,8 @@ class Equilibrium:
         strain = self._inner.strain
         if strain is None:
             return None
-        membrane, *layers = (StrainExtremes(*largest, AreaStrains(*area)) for largest, area in (strain[0], *strain[1]))
-        return Strain(membrane, layers)
+        membrane, layers = strain
+        return Strain(_extremes(*membrane), [_extremes(*layer) for layer in layers])
 
     def strain_at(self, places: npt.ArrayLike) -> PointStrain | None:
         """Curvature and strain at places (u, v) of the flat board, u along the spine and v square to it.
@@ -778,6 +778,11 @@ def _direction(direction: npt.ArrayLike) -> list[float]:
         raise InvalidArgument(f"direction: found {direction!r}, allowed six finite numbers, not all 0")
     numbers: list[float] = vector.tolist()
     return numbers
+
+
+def _extremes(largest: list[float], area: list[float]) -> StrainExtremes:
+    value, u, v = largest
+    return StrainExtremes(value, u, v, AreaStrains(*area))
 
 
 def _flat_points(name: str, of: npt.ArrayLike) -> list[list[float]]:

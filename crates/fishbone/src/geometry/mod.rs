@@ -380,7 +380,7 @@ pub struct Euler {
 /// The frame of Eulerian angles.
 ///
 /// Source: Eq. (1)
-pub fn frame_from_euler(euler: &Euler) -> Matrix3<f64> {
+pub(crate) fn frame_from_euler(euler: &Euler) -> Matrix3<f64> {
     let (s_phi, c_phi) = euler.phi.sin_cos();
     let (s_theta, c_theta) = euler.theta.sin_cos();
     let (s_psi, c_psi) = euler.psi.sin_cos();

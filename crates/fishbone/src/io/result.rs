@@ -9,7 +9,7 @@ use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 
 /// Name and version of the result schema, a word.
-pub const SCHEMA: &str = "fishbone.result/1";
+const SCHEMA: &str = "fishbone.result/1";
 
 type Point = [f64; 3];
 
@@ -175,7 +175,7 @@ impl Error {
 }
 
 impl Equilibrium {
-    /// The result as one JSON object, schema [`SCHEMA`]; the same text for the same equilibrium.
+    /// The result as one JSON object, schema `fishbone.result/1`; the same text for the same equilibrium.
     pub fn to_json(&self) -> String {
         serde_json::to_string(&Record::new(self)).expect("numbers and strings alone")
     }

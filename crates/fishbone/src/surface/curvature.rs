@@ -38,7 +38,7 @@ impl FirstForm {
     }
 
     /// Determinant E G − F².
-    pub fn determinant(&self) -> f64 {
+    pub(crate) fn determinant(&self) -> f64 {
         self.e * self.g - self.f * self.f
     }
 }
@@ -83,7 +83,7 @@ impl SecondForm {
     }
 
     /// Determinant L N − M².
-    pub fn determinant(&self) -> f64 {
+    pub(crate) fn determinant(&self) -> f64 {
         self.l * self.n - self.m * self.m
     }
 }
@@ -171,7 +171,7 @@ pub fn frame_derivative(frame: &Matrix3<f64>, rates: &Vector3<f64>) -> Matrix3<f
 /// Radius of bend at the point v of a rib, `(1 − v s)/|κ₁|`; infinite where κ₁ = 0.
 ///
 /// Ribs that gather towards one edge carry the bend of the spine into less and less length there.
-pub fn bend_radius(curvature: f64, rib_convergence: f64, v: f64) -> f64 {
+pub(crate) fn bend_radius(curvature: f64, rib_convergence: f64, v: f64) -> f64 {
     if curvature == 0.0 {
         return f64::INFINITY;
     }

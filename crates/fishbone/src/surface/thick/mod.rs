@@ -39,7 +39,6 @@ use tensor::BoardTensor;
 const PARTS: usize = 3;
 /// Distance from ends, stiffeners, corners and joints of the board from which on extremes are given, in widths.
 const CLEAR: f64 = 0.2;
-
 /// Rounding of a place, in lengths of the board.
 const ROUNDING: f64 = 1e-9;
 
