@@ -66,6 +66,24 @@ def test_the_table_shows_energy_extremes_and_reactions(run, example_file):
         assert f"moment on the belt, {place}" in out
 
 
+def test_the_table_shows_the_strain_of_every_layer_in_per_cent(run, example):
+    tables = example.to_dict() | {"energy": "shell"}
+    del tables["belt"]["rigidity"]
+    layers = [{"material": "PET", "thickness": 4e-4}, {"material": "PET", "thickness": 3e-4}]
+    Path("laminate.json").write_text(json.dumps(tables | {"belt": tables["belt"] | {"layers": layers}}), "utf-8")
+    code, out, _ = run("solve", "laminate.json")
+    assert code == 0
+    equilibrium = fb.solve(fb.load("laminate.json"))
+    assert equilibrium.strain is not None
+    lines = {line.split("  ")[0]: line for line in out.splitlines()}
+    for index, layer in enumerate(equilibrium.strain.layers, start=1):
+        largest = lines[f"largest strain, layer {index} of 2, V/5 off clamps"]
+        assert f"{100.0 * layer.value:.5g}  %, at u = {layer.u:.5g}, v = {layer.v:.5g}" in largest
+        assert f"{100.0 * layer.area.p99:.5g}  %, or less" in lines[f"strain, layer {index} of 2, 99 % of the area"]
+    assert equilibrium.least_bend_radius is not None
+    assert f"{equilibrium.least_bend_radius.value:.5g}  m, at u" in lines["least bend radius, V/5 off clamps"]
+
+
 def test_the_table_shows_loads_links_and_hinges(run, example):
     tables = example.to_dict()
     tables["belt"]["density"] = 1.0

@@ -97,6 +97,20 @@ fn test_a_bent_board_curls_at_its_edges_until_no_moment_acts_across() {
     assert_relative_eq!(face.value, expected + 1e-4 * bend, max_relative = 1e-5);
     assert_eq!(face.v.abs(), 0.05);
     assert_eq!(at(face.u, face.v).layers, [face.value]);
+    // The outside of the bend, on the side of ξ, is stretched more than the inside is pressed.
+    arch.curved.as_mut().unwrap().faces = vec![-1e-4, 0.0, 1e-4];
+    let [bottom, top] = strain_at(&arch, &[[0.5, 0.05]]).unwrap()[0].layers[..] else {
+        panic!("there are two layers");
+    };
+    assert_relative_eq!(bottom, 1e-4 * bend - expected, max_relative = 1e-4);
+    assert_relative_eq!(top, 1e-4 * bend + expected, max_relative = 1e-4);
+}
+
+#[test]
+fn test_there_is_nothing_off_the_board() {
+    let arch = of_plain(spine(1.0, WIDTH, 20, |_| 4.0, |_| 0.0), 1e-3, 0.3);
+    let at = |u: f64, v: f64| strain_at(&arch, &[[u, v]]).unwrap().remove(0);
+    assert!(at(1.0, -0.05).curvature[0] < -3.9);
     for off in [at(0.5, 0.0501), at(1.0001, 0.0), at(-0.0001, 0.0)] {
         assert!(off.curvature[0].is_nan() && off.layers[0].is_nan());
     }
