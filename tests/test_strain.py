@@ -137,6 +137,16 @@ def test_rolled_strip_has_the_radius_and_the_strain_of_its_cylinder() -> None:
     assert strain_of(found).membrane.value < 1e-6 * strain
 
 
+def test_segments_are_strained_from_their_own_natural_bend() -> None:
+    thickness = 1e-3
+    supports = [support("start", ORIGIN, ORIGIN), support("end", (0.0, 0.9, 0.0), ORIGIN)]
+    found = solve(thick(board([straight(0.5, natural_bend=3.0), straight(0.5)], supports), thickness, 0.0))
+    there = found.strain_at([[0.25, 0.0], [0.75, 0.0]])
+    assert there is not None
+    bend = -there.curvature[:, 0, 0]
+    assert there.layers[:, 0] == pytest.approx(0.5 * thickness * np.abs(bend - [3.0, 0.0]), rel=5e-3)
+
+
 def test_layers_are_strained_by_their_heights() -> None:
     """Two layers of one material are one sheet cut at a height: each has the strain of its outer face."""
     thickness, width, cut = 140e-6, 0.02, 50e-6

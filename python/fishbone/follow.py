@@ -340,10 +340,10 @@ class Diagram:
 
         The columns are branch, state, parameter, energy, height, stable, negative_modes, event (its kind, or empty),
         supports[0].force.x … supports[k].moment.z, least_spine_radius, bend_radius.p999, bend_radius.p99,
-        bend_radius.p95 (exceeded on 99.9, 99 and 95 % of the area), least_bend_radius (over the width; falls with the
-        mesh), rib_margin, status, residual, error (the largest by the mesh), confirmed (of the event; True without
-        one), jump, released, and angle along poses that have one. Where nothing bends the radii on the spine and over
-        the width are NaN.
+        bend_radius.p95 (exceeded on 99.9, 99 and 95 % of the area), least_bend_radius (over the width; of developable
+        belts it falls with the mesh), rib_margin, status, residual, error (the largest by the mesh), confirmed (of the
+        event; True without one), jump, released, and angle along poses that have one. Where nothing bends the radii on
+        the spine and over the width are NaN.
 
         A branch that ends where the belt snaps has one row more, of the minimum after the snap: its event is "snap",
         and jump and released are the size of the snap, NaN in other rows.
