@@ -150,7 +150,7 @@ pub fn mean_curvature_on_spine(bend: f64, transverse: f64) -> f64 {
 /// Written in β, not as −ω_η²/ω_ζ: nothing is divided by a bend that may vanish.
 ///
 /// Source: Eq. (24)
-pub fn transverse(bend: f64, rib_slope: f64) -> f64 {
+pub(crate) fn transverse(bend: f64, rib_slope: f64) -> f64 {
     -bend * rib_slope * rib_slope
 }
 

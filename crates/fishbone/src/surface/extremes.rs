@@ -1,7 +1,7 @@
 //! Highest point, tightest bend, narrowest margin.
 
-use super::curvature::{FirstForm, SecondForm, bend_radius, curvature, principal_curvatures};
-use super::thick::ThickBoard;
+use super::curvature::{bend_radius, curvature};
+use super::thick::{BoardTensor, ThickBoard};
 use crate::board::feet::Board;
 use crate::strip::flat::FLAT;
 use crate::strip::ribs::rib_convergence_bound;
@@ -140,10 +140,9 @@ fn radii_on_spine(spine: &Spine) -> Vec<SpineRadius> {
     let at = |(element, share): (usize, f64)| {
         let distance = share * spine.element_length(element);
         let rib = spine.rib(element, distance)?;
-        let [l, m, n] = rib.curvature(0.0, 0.0).on_board(rib.slope);
-        let (larger, _) = principal_curvatures(&FirstForm::ON_SPINE, &SecondForm { l, m, n });
+        let bend = BoardTensor::on_rib(&rib.curvature(0.0, 0.0), rib.slope).largest();
         Some(SpineRadius {
-            value: 1.0 / larger.abs(),
+            value: 1.0 / bend,
             u: spine.u[element] + distance,
         })
     };

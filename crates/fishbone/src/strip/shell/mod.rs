@@ -185,15 +185,6 @@ pub(crate) struct Curvature<T> {
     pub(crate) area: T,
 }
 
-impl<T: DualNum<Primitive = f64> + Copy> Curvature<T> {
-    /// The tensor in the axes of the board along and across the spine, b_uu, b_uv, b_vv, on a rib of a slope.
-    pub(crate) fn on_board(&self, slope: T) -> [T; 3] {
-        let mixed = self.mixed + slope * self.along;
-        let across = self.across + slope * self.mixed + slope * mixed;
-        [self.along, mixed, across]
-    }
-}
-
 impl<W: Copy + Neg<Output = W>> Plate<W> {
     pub(crate) fn of(geodesic: f64, stock: &Stock<W>) -> Self {
         Self {

@@ -230,13 +230,7 @@ impl Foot {
     fn on_own_side(&self, v: f64) -> (f64, BoardTensor) {
         let (slope, geodesic) = (self.rib.slope, self.geodesic);
         let along = self.along(v);
-        let b = self.rib.curvature(geodesic, along);
-        let mixed = b.mixed + slope * b.along;
-        let tensor = BoardTensor {
-            uu: b.along,
-            uv: mixed,
-            vv: b.across + slope * (b.mixed + mixed),
-        };
+        let tensor = BoardTensor::on_rib(&self.rib.curvature(geodesic, along), slope);
         if geodesic == 0.0 {
             return (self.u - slope * along, tensor);
         }

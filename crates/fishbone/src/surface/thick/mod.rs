@@ -24,6 +24,7 @@ mod tensor;
 
 pub(super) use shares::Shares;
 pub use strain::{PointStrain, Strain, StrainExtremes, strain, strain_at};
+pub(super) use tensor::BoardTensor;
 
 use super::extremes::Extreme;
 use crate::board::outline::outline;
@@ -33,7 +34,6 @@ use cells::{Cells, Field, stretches};
 use layers::Plan;
 use nalgebra::DMatrix;
 use rows::{ROWS, Rows};
-use tensor::BoardTensor;
 
 /// Parts of a cell between two rows in which a value is taken as uniform, a number.
 const PARTS: usize = 3;

@@ -1,10 +1,11 @@
 //! Symmetric tensors of the board's plane: curvature and strain.
 
+use crate::strip::shell::Curvature;
 use std::ops::{Add, Mul};
 
 /// A symmetric tensor at a point of the flat board, in its axes there: u along the spine, v across.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct BoardTensor {
+pub(in crate::surface) struct BoardTensor {
     /// Along u.
     pub(super) uu: f64,
     /// The mixed component, half of an angle if it is a strain.
@@ -14,8 +15,18 @@ pub(super) struct BoardTensor {
 }
 
 impl BoardTensor {
+    /// The curvature at a point of a rib of a slope, in axes along and across the spine.
+    pub(in crate::surface) fn on_rib(b: &Curvature<f64>, slope: f64) -> Self {
+        let mixed = b.mixed + slope * b.along;
+        Self {
+            uu: b.along,
+            uv: mixed,
+            vv: b.across + slope * (b.mixed + mixed),
+        }
+    }
+
     /// Magnitude of the principal value of larger magnitude.
-    pub(super) fn largest(&self) -> f64 {
+    pub(in crate::surface) fn largest(&self) -> f64 {
         let mean = 0.5 * (self.uu + self.vv);
         mean.abs() + self.uv.hypot(0.5 * (self.uu - self.vv))
     }
