@@ -192,10 +192,7 @@ def test_energy_of_a_strip_changes_with_a_sheet_of_a_material_by_its_rigidity_to
     by_rigidity = np.full(len(found.u), 3.0 * rigidity / 140e-6)
     change = found.sensitivity().forward(thickness=1.0, rigidity=by_rigidity)
     step = 1e-9
-    energies = [
-        solve(with_number(scenario, ("belt", "material", "thickness"), by)).energy
-        for by in (-step, step)
-    ]
+    energies = [solve(with_number(scenario, ("belt", "material", "thickness"), by)).energy for by in (-step, step)]
     assert change.energy == pytest.approx((energies[1] - energies[0]) / (2.0 * step), rel=1e-6)
 
 
@@ -223,7 +220,9 @@ def test_tracker_has_the_strip_of_every_pose_and_comes_back() -> None:
             assert np.abs(tracker.position - afresh.position).max() < 1e-7
             for at in range(2):
                 expected = np.concatenate(afresh.reaction(at))
-                assert np.concatenate(tracker.reaction(at)) == pytest.approx(expected, abs=1e-4 * np.abs(expected).max())
+                assert np.concatenate(tracker.reaction(at)) == pytest.approx(
+                    expected, abs=1e-4 * np.abs(expected).max()
+                )
             assert tracker.equilibrium().stable
     assert tracker.energy == pytest.approx(energy, rel=1e-9)
     assert np.abs(tracker.position - start).max() < 1e-7

@@ -135,8 +135,8 @@ class Sensitivity:
             _array("reactions", reactions, (m, 6)),
             float(_array("energy", energy, ())),
         )
-        supports, rigidity, natural_bend, sheet, gravity = self._inner.adjoint(*arguments)
-        return Gradient(supports, rigidity, natural_bend, *sheet, np.array(gravity))
+        supports, rigidity, natural_bend, (width, thickness, poisson), gravity = self._inner.adjoint(*arguments)
+        return Gradient(supports, rigidity, natural_bend, width, thickness, poisson, np.array(gravity))
 
     def jacobian(self, support: int) -> Floats:
         """Derivatives of the spine positions by the motion of a support, which is named by its index.
