@@ -1,4 +1,4 @@
-"""Strips of finite thickness that are led: derivatives, trackers, paths and margins, against equilibria solved afresh."""
+"""Strips of finite thickness that are led: derivatives, trackers, paths and margins against strips solved afresh."""
 
 from __future__ import annotations
 

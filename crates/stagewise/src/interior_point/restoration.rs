@@ -29,16 +29,30 @@ impl<const X: usize, const U: usize, const N: usize> Restoration<X, U, N> {
         &mut self,
         iterate: &mut PrimalDual<P, X, U, N>,
     ) -> bool {
+        /// Dampings that are tried in turn, over that of the barrier: a step in directions that hardly change the equalities
+        /// may be so long that nothing along it is linear.
+        const DAMPINGS: [f64; 3] = [1.0, 1e2, 1e4];
+        self.kkt
+            .linearise(&iterate.program, &iterate.point, &iterate.multipliers);
+        self.kkt.linear.forget_second_derivatives();
+        let damping = iterate.barrier.parameter.sqrt();
+        DAMPINGS
+            .into_iter()
+            .any(|more| self.damped_step(iterate, more * damping))
+    }
+
+    /// A step with a damping, at the linearisation of the point; false where no length decreases the violation.
+    fn damped_step<P: Program<X, U, N>>(
+        &mut self,
+        iterate: &mut PrimalDual<P, X, U, N>,
+        damping: f64,
+    ) -> bool {
         /// Length of the shortest trial step, as a share of the restoration step; dimensionless.
         const SHORTEST_STEP: f64 = 1e-8;
         /// Ratio of the decrease of the violation to its linear prediction that is sufficient (Armijo); dimensionless.
         const SUFFICIENT: f64 = 1e-4;
         self.kkt
-            .linearise(&iterate.program, &iterate.point, &iterate.multipliers);
-        self.kkt.linear.forget_second_derivatives();
-        self.kkt
             .assemble(&iterate.values, &iterate.multipliers.inequalities);
-        let damping = iterate.barrier.parameter.sqrt();
         if self.kkt.factorise_damped(damping).is_err() {
             return false;
         }

@@ -351,7 +351,7 @@ fn from_shape(
     proceed: &mut Proceed,
 ) -> (ShellProgram, ShellSolution) {
     /// Iterations that the search with the strong gauge may take, a number: most take 10 to 60.
-    const ITERATIONS: usize = 150;
+    const ITERATIONS: usize = 300;
     let [strong, weak] =
         [Gauge::STRONG, Gauge::WEAK].map(|gauge| developable.as_shell(Shell::new(gauge, POINTS)));
     let [wide, narrow] = BARRIERS.map(|barrier| settings(problem, barrier));
