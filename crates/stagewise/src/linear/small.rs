@@ -46,16 +46,45 @@ fn invert_two([a, b, d]: [f64; 3], most: usize) -> Result<([f64; 3], usize), Too
     Ok(([d * inverse, -b * inverse, a * inverse], negative))
 }
 
+#[inline(always)]
 fn invert_any<const U: usize>(
     matrix: &[[f64; U]; U],
     most: usize,
 ) -> Result<([[f64; U]; U], usize), TooConcave> {
-    let matrix = SMatrix::<f64, U, U>::from_fn(|i, j| matrix[i][j]);
-    if let Some(cholesky) = matrix.cholesky() {
-        return Ok((cholesky.inverse().data.0, 0));
+    if let Some(inverse) = invert_positive(matrix) {
+        return Ok((inverse, 0));
     }
+    let matrix = SMatrix::<f64, U, U>::from_fn(|i, j| matrix[i][j]);
     let (inverse, negative) = invert_indefinite(&matrix, most)?;
     Ok((inverse.data.0, negative))
+}
+
+/// Inverse of a positive definite matrix, by exchange of one unknown after the other for its equation's right-hand side;
+/// `None` where the matrix is not positive definite.
+#[inline(always)]
+fn invert_positive<const U: usize>(matrix: &[[f64; U]; U]) -> Option<[[f64; U]; U]> {
+    let mut rows = *matrix;
+    for k in 0..U {
+        let mut own = rows[k];
+        let pivot = std::mem::replace(&mut own[k], 1.0);
+        // The comparison is false for a NaN.
+        let positive = pivot > 0.0;
+        if !positive {
+            return None;
+        }
+        let inverse = 1.0 / pivot;
+        for entry in &mut own {
+            *entry *= inverse;
+        }
+        for row in &mut rows {
+            let by = std::mem::replace(&mut row[k], 0.0);
+            for (entry, own) in row.iter_mut().zip(&own) {
+                *entry -= by * own;
+            }
+        }
+        rows[k] = own;
+    }
+    Some(rows)
 }
 
 /// Inverse of a symmetric matrix by its eigenvectors, with at most `most` negative eigenvalues, and their number.
