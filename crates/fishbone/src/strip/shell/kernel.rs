@@ -85,6 +85,7 @@ impl PosePoints {
 pub(crate) struct Block {
     input: Input,
     output: Output,
+    work: Work,
 }
 
 /// The data that the energy of a block depends on.
@@ -196,6 +197,7 @@ impl Default for Block {
                 growth: [[Wide::ZERO; 6]; MOVING],
                 mixed: [[Wide::ZERO; 6]; MOVING],
             },
+            work: Work::EMPTY,
         }
     }
 }
@@ -220,10 +222,15 @@ impl density::Derivatives<Shell, FIELDS> for Block {
     }
 
     fn find(&mut self, shell: &Shell) {
-        let curved = self.input.ribs.plates.geodesic.0;
-        match curved.iter().any(|geodesic| *geodesic != 0.0) {
-            true => find::<true>(shell, &self.input, &mut self.output),
-            false => find::<false>(shell, &self.input, &mut self.output),
+        let Self {
+            input,
+            output,
+            work,
+        } = self;
+        let mut geodesic = input.ribs.plates.geodesic.0.iter();
+        match geodesic.any(|geodesic| *geodesic != 0.0) {
+            true => find::<true>(shell, input, work, output),
+            false => find::<false>(shell, input, work, output),
         }
     }
 
@@ -298,10 +305,10 @@ fn find_energies(shell: &Shell, ribs: &Ribs) -> Wide {
 
 /// Derivatives of all lanes; `CURVED` where a board of the block is curved in its plane.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2"))]
-fn find<const CURVED: bool>(shell: &Shell, input: &Input, output: &mut Output) {
+fn find<const CURVED: bool>(shell: &Shell, input: &Input, work: &mut Work, output: &mut Output) {
     let ribs = &input.ribs;
     let geodesic = ribs.plates.geodesic;
-    let (mut work, mut jet) = (Work::EMPTY, Jet::ZERO);
+    let mut jet = Jet::ZERO;
     output.gradient = [Wide::ZERO; UNKNOWNS];
     output.hessian = [[Wide::ZERO; UNKNOWNS]; UNKNOWNS];
     for (place, [t, _]) in GAUSS_4.into_iter().enumerate() {
@@ -313,7 +320,7 @@ fn find<const CURVED: bool>(shell: &Shell, input: &Input, output: &mut Output) {
             fields
         };
         let (across, gauge) = (&shell.across, shell.gauge);
-        differentiate::<CURVED>(&x, &ribs.plates, across, gauge, &mut work, &mut jet);
+        differentiate::<CURVED>(&x, &ribs.plates, across, gauge, work, &mut jet);
         if CURVED {
             by_fields(&fields, geodesic, &mut jet);
         }

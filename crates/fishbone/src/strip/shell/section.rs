@@ -97,8 +97,10 @@ impl Jet {
 }
 
 /// Arrays that [`differentiate`] writes and reads.
+#[derive(Debug, Clone)]
 pub(super) struct Work {
     points: [Point; MOST],
+    gauss: [Wide; MOST],
     /// Factors of the derivatives of b(t,t) at every point: in the gradient, and in the rows of q, β and s.
     pulls: [[Wide; 4]; MOST],
     by_gauss: [Row; MOST],
@@ -110,6 +112,7 @@ pub(super) struct Work {
 impl Work {
     pub(super) const EMPTY: Self = Self {
         points: [Point::NONE; MOST],
+        gauss: [Wide::ZERO; MOST],
         pulls: [[Wide::ZERO; 4]; MOST],
         by_gauss: [[Wide::ZERO; INPUTS]; MOST],
         left: [[Wide::ZERO; INPUTS]; SQUARES],
@@ -147,14 +150,14 @@ impl Strain {
         }
     }
 
-    /// The modes of the strain.
+    /// The modes of the strain, from the Gauss curvature at the points.
     #[inline(always)]
-    fn modes(&self, points: &[Point], rule: &Across) -> [Wide; MODES] {
+    fn modes(&self, gauss: &[Wide], rule: &Across) -> [Wide; MODES] {
         let mut modes = [Wide::ZERO; MODES];
         for (mode, factors) in modes.iter_mut().zip(&rule.modes).take(self.count) {
             let mut sum = Wide::ZERO;
-            for (point, factor) in points.iter().zip(factors) {
-                sum += point.gauss * *factor;
+            for (gauss, factor) in gauss.iter().zip(factors) {
+                sum += *gauss * *factor;
             }
             *mode = sum;
         }
@@ -177,16 +180,16 @@ impl Strain {
 /// The density of every lane at numbers x; infinite where ribs meet within the width.
 #[inline(always)]
 pub(super) fn density(x: &Row, plates: &Plates, rule: &Across, gauge: Gauge) -> Wide {
-    let mut points = [Point::NONE; MOST];
+    let mut gauss = [Wide::ZERO; MOST];
     let (view, strain) = (View::of(x, plates), Strain::of(x, plates, rule));
     let mut sum = Wide::ZERO;
     for i in 0..rule.points {
         let point = Point::at::<true>(x, plates, rule.t[i]);
         let [mean, _] = view.mean(&point);
         sum += view.energy(&point, mean) * point.area * (0.5 * rule.weight[i]);
-        points[i].gauss = point.gauss;
+        gauss[i] = point.gauss;
     }
-    let modes = strain.modes(&points[..rule.points], rule);
+    let modes = strain.modes(&gauss[..rule.points], rule);
     let mut work = -(strain.linear[0] * modes[0] * modes[0]);
     for n in 0..strain.count {
         work += modes[n] * modes[n];
@@ -217,11 +220,12 @@ pub(super) fn differentiate<const CURVED: bool>(
     into: &mut Jet,
 ) {
     for i in 0..rule.points {
-        work.points[i] = Point::at::<CURVED>(x, plates, rule.t[i]);
+        let point = Point::at::<CURVED>(x, plates, rule.t[i]);
+        (work.gauss[i], work.points[i]) = (point.gauss, point);
     }
     let strain = Strain::of(x, plates, rule);
     let stiffness = plates.stiffness() * 0.5;
-    let modes = strain.modes(&work.points[..rule.points], rule);
+    let modes = strain.modes(&work.gauss[..rule.points], rule);
     let linear = strain.linear;
     let (by_area, lead) = (
         strain.narrowed(&modes, linear[1], rule),
