@@ -17,6 +17,9 @@ pub struct PairMatrix<const M: usize> {
 /// A quadratic form in the controls at both ends of a stage.
 pub type StageMatrix<const U: usize> = PairMatrix<U>;
 
+/// Numbers at a node from which on a linear form has few that are not zero, a number.
+const MANY: usize = 3;
+
 /// A square of a linear form in numbers at two nodes, and the factor before it.
 pub(super) type Square<const M: usize> = (f64, [SVector<f64, M>; 2]);
 
@@ -34,9 +37,18 @@ impl<const M: usize> PairMatrix<M> {
     #[inline(always)]
     pub(crate) fn add_square(&mut self, factor: f64, [first, second]: &[SVector<f64, M>; 2]) {
         let (by_first, by_second) = (factor * first, factor * second);
-        self.first += by_first * first.transpose();
-        self.mixed += by_first * second.transpose();
-        self.second += by_second * second.transpose();
+        let columns =
+            |by: &SVector<f64, M>, form: &SVector<f64, M>, into: &mut SMatrix<f64, M, M>| {
+                for (mut column, entry) in into.column_iter_mut().zip(form) {
+                    // Forms of many entries have few that are not zero.
+                    if M < MANY || *entry != 0.0 {
+                        column += *entry * by;
+                    }
+                }
+            };
+        columns(&by_first, first, &mut self.first);
+        columns(&by_first, second, &mut self.mixed);
+        columns(&by_second, second, &mut self.second);
     }
 
     /// The product with a vector at either node.
