@@ -420,15 +420,16 @@ fn add_motion(input: &Input, output: &mut Output) {
         for (into, value) in work.iter_mut().zip(motion.work) {
             into.0[lane] = value;
         }
-        for i in 0..4 {
-            motion.place.carry(
-                motion.twists.rotation[i],
-                motion.twists.displacement[i],
-                lane,
-                &mut growth[i],
-                &mut mixed[i],
-            );
-        }
+        let (place, turns, shifts) = (
+            &motion.place,
+            &motion.twists.rotation,
+            &motion.twists.displacement,
+        );
+        // Written out: the vectoriser would take a loop over the four columns for the loop over lanes.
+        place.carry(turns[0], shifts[0], lane, &mut growth[0], &mut mixed[0]);
+        place.carry(turns[1], shifts[1], lane, &mut growth[1], &mut mixed[1]);
+        place.carry(turns[2], shifts[2], lane, &mut growth[2], &mut mixed[2]);
+        place.carry(turns[3], shifts[3], lane, &mut growth[3], &mut mixed[3]);
     }
     let columns = by_pose_points(input);
     for (unknown, by) in columns.iter().enumerate() {
