@@ -22,7 +22,7 @@ use crate::strip::kernel::lane::{Motion, Step};
 use crate::strip::kernel::{self, Even, NOTHING, Spans, Surroundings};
 use interpolation::Interpolation;
 use multiversion::multiversion;
-use nalgebra::{SVector, Vector4};
+use nalgebra::{SMatrix, SVector, Vector4};
 use stagewise::{Stage, StageMatrix};
 
 /// Unknowns of an element: for every field the unknowns at the first node, then at the second.
@@ -31,6 +31,28 @@ const UNKNOWNS: usize = 2 * FIELDS;
 const MOVING: usize = 8;
 /// Place among the unknowns of every field of the first node, then of the second.
 const PLACES: [[usize; FIELDS]; 2] = [[0, 2, 3, 6, 8, 9], [1, 4, 5, 7, 10, 11]];
+
+/// Places in the second derivative, row by row, of the entries of a stage's matrices, column by column: of the first node, of
+/// both, of the second.
+const ENTRIES: [[usize; FIELDS * FIELDS]; 3] = [
+    entries(PLACES[0], PLACES[0]),
+    entries(PLACES[0], PLACES[1]),
+    entries(PLACES[1], PLACES[1]),
+];
+
+const fn entries(rows: [usize; FIELDS], columns: [usize; FIELDS]) -> [usize; FIELDS * FIELDS] {
+    let (mut out, mut at) = ([0; FIELDS * FIELDS], 0);
+    while at < FIELDS * FIELDS {
+        let (row, column) = (rows[at % FIELDS], columns[at / FIELDS]);
+        // The second derivative is valid on the diagonal and right of it.
+        out[at] = match row < column {
+            true => row * UNKNOWNS + column,
+            false => column * UNKNOWNS + row,
+        };
+        at += 1;
+    }
+    out
+}
 
 /// The motions along a block of elements.
 #[derive(Debug, Clone, Default)]
@@ -240,17 +262,16 @@ impl density::Derivatives<Shell, FIELDS> for Block {
     }
 
     fn hessian(&self, lane: usize) -> StageMatrix<FIELDS> {
-        let at = |i: usize, j: usize| self.output.hessian[i.min(j)][i.max(j)].0[lane];
-        let [first, second] = PLACES;
-        let mut out = StageMatrix::zeros();
-        for j in 0..FIELDS {
-            for i in 0..FIELDS {
-                out.first[(i, j)] = at(first[i], first[j]);
-                out.mixed[(i, j)] = at(first[i], second[j]);
-                out.second[(i, j)] = at(second[i], second[j]);
-            }
+        let entries = self.output.hessian.as_flattened();
+        let matrix = |places: &[usize; FIELDS * FIELDS]| {
+            SMatrix::from_iterator(places.iter().map(|place| entries[*place].0[lane]))
+        };
+        let [first, mixed, second] = &ENTRIES;
+        StageMatrix {
+            first: matrix(first),
+            mixed: matrix(mixed),
+            second: matrix(second),
         }
-        out
     }
 
     fn carry<const N: usize>(&self, lane: usize, stage: &mut Stage<FIELDS, N>) {
