@@ -198,12 +198,17 @@ impl<const X: usize, const U: usize, const N: usize> Linearisation<X, U, N> {
             let [first, second, ..] = &mut into[stage..] else {
                 break;
             };
+            let mut ends = [first, second].map(|node| node.fixed_rows_mut::<U>(X));
+            let mut sums = [ends[0].clone_owned(), ends[1].clone_owned()];
             for (row, slack) in stage_slacks.by_ref().take(rows) {
                 let factor = factor(row);
                 for i in 0..U {
-                    first[X + i] += factor * slack[0][i];
-                    second[X + i] += factor * slack[1][i];
+                    sums[0][i] += factor * slack[0][i];
+                    sums[1][i] += factor * slack[1][i];
                 }
+            }
+            for (end, sum) in ends.iter_mut().zip(&sums) {
+                end.copy_from(sum);
             }
         }
         let mut row = layout.inequalities_at_stages();
