@@ -325,7 +325,7 @@ pub(in crate::strip) fn find_motions<S: Step>(
     let even = Even::of::<S>(spans);
     for lane in 0..LANES {
         let step = S::at(spans, lane);
-        let (phi, rho) = (step.rotation(), step.translation());
+        let (phi, rho) = (step.rotation(), step.chord().translation());
         let [s, c, q] = [even.sine[lane], even.cosine[0][lane], even.cubic[0][lane]];
         let (square, along) = (dot(phi, phi), dot(phi, rho));
         let turned = cross(phi, rho);

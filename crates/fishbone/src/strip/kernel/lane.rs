@@ -16,35 +16,67 @@ pub(in crate::strip) trait Step: Copy {
     /// Rotation of the step.
     fn rotation(&self) -> Triple;
 
-    /// Translation of the step.
-    fn translation(&self) -> Triple;
+    /// Chord of the step.
+    fn chord(&self) -> &Chord;
 
     /// Derivatives of the rotation by the four fields.
     fn rotation_by_gauss(&self) -> [Triple; 4];
-
-    /// Derivative of the translation by the bend at the second Gauss point; that by the bend at the first is the opposite,
-    /// and the other fields do not change it.
-    fn translation_by_rise(&self) -> Triple;
-
-    /// Second derivative along η of the translation by the bend at the second Gauss point.
-    fn translation_by_rise_twice(&self) -> f64;
 
     /// Second derivatives of `by_rotation · rotation`.
     fn second_derivatives(&self, by_rotation: Triple) -> Upper;
 }
 
+/// The translation of a Magnus step, by the rise of the bend from the first Gauss point to the second.
+#[derive(Clone, Copy)]
+pub(in crate::strip) struct Chord {
+    length: f64,
+    rise: f64,
+    /// Weight of the commutator.
+    pub(in crate::strip) weight: f64,
+    shortening: f64,
+}
+
+impl Chord {
+    #[inline(always)]
+    pub(in crate::strip) fn of(length: f64, bend: [f64; 2]) -> Self {
+        Self {
+            length,
+            rise: bend[1] - bend[0],
+            weight: COMMUTATOR * length * length,
+            shortening: SHORTENING * length * length * length,
+        }
+    }
+
+    #[inline(always)]
+    pub(in crate::strip) fn translation(&self) -> Triple {
+        let along = self.length - self.shortening * self.rise * self.rise;
+        [self.weight * self.rise, along, 0.0]
+    }
+
+    /// Derivative of the translation by the bend at the second Gauss point; that by the bend at the first is the opposite,
+    /// and the other fields do not change it.
+    #[inline(always)]
+    fn by_rise(&self) -> Triple {
+        [self.weight, -2.0 * self.shortening * self.rise, 0.0]
+    }
+
+    /// Second derivative along η of the translation by the bend at the second Gauss point.
+    #[inline(always)]
+    fn by_rise_twice(&self) -> f64 {
+        -2.0 * self.shortening
+    }
+}
+
 /// The Magnus step of a developable element, by bend and rib slope, with the parts of its derivatives: the fields at the
-/// Gauss points, the weights of the sum, of the commutator and of the chord's shortening.
+/// Gauss points and the weight of the sum.
 #[derive(Clone, Copy)]
 pub(super) struct Magnus {
     rotation: Triple,
-    translation: Triple,
+    chord: Chord,
     bend: [f64; 2],
     slope: [f64; 2],
     geodesic: f64,
     half: f64,
-    weight: f64,
-    shortening: f64,
 }
 
 impl Step for Magnus {
@@ -60,8 +92,8 @@ impl Step for Magnus {
         let bend = [more * b0 + less * b1, less * b0 + more * b1];
         let slope = [more * s0 + less * s1, less * s0 + more * s1];
         let (h, geodesic) = (spans.length[lane], spans.geodesic[lane]);
-        let (half, weight) = (0.5 * h, COMMUTATOR * h * h);
-        let (rise, shortening) = (bend[1] - bend[0], SHORTENING * h * h * h);
+        let (half, chord) = (0.5 * h, Chord::of(h, bend));
+        let weight = chord.weight;
         let [torsion_1, torsion_2] = [-slope[0] * bend[0], -slope[1] * bend[1]];
         Self {
             rotation: [
@@ -69,13 +101,11 @@ impl Step for Magnus {
                 half * (torsion_1 + torsion_2) + weight * geodesic * (bend[0] - bend[1]),
                 half * (bend[0] + bend[1]) + weight * geodesic * (torsion_2 - torsion_1),
             ],
-            translation: [weight * rise, h - shortening * rise * rise, 0.0],
+            chord,
             bend,
             slope,
             geodesic,
             half,
-            weight,
-            shortening,
         }
     }
 
@@ -85,14 +115,18 @@ impl Step for Magnus {
     }
 
     #[inline(always)]
-    fn translation(&self) -> Triple {
-        self.translation
+    fn chord(&self) -> &Chord {
+        &self.chord
     }
 
     #[inline(always)]
     fn rotation_by_gauss(&self) -> [Triple; 4] {
         let ([b1, b2], [s1, s2]) = (self.bend, self.slope);
-        let (half, w, geodesic) = (self.half, self.weight, self.weight * self.geodesic);
+        let (half, w, geodesic) = (
+            self.half,
+            self.chord.weight,
+            self.chord.weight * self.geodesic,
+        );
         [
             [
                 w * b2 * (s2 - s1),
@@ -110,22 +144,11 @@ impl Step for Magnus {
     }
 
     #[inline(always)]
-    fn translation_by_rise(&self) -> Triple {
-        let rise = self.bend[1] - self.bend[0];
-        [self.weight, -2.0 * self.shortening * rise, 0.0]
-    }
-
-    #[inline(always)]
-    fn translation_by_rise_twice(&self) -> f64 {
-        -2.0 * self.shortening
-    }
-
-    #[inline(always)]
     fn second_derivatives(&self, by_rotation: Triple) -> Upper {
         let ([b1, b2], [s1, s2]) = (self.bend, self.slope);
-        let x = by_rotation[0] * self.weight;
+        let x = by_rotation[0] * self.chord.weight;
         let y = by_rotation[1] * self.half;
-        let z = by_rotation[2] * self.weight * self.geodesic;
+        let z = by_rotation[2] * self.chord.weight * self.geodesic;
         let bends = x * (s2 - s1);
         let [own_1, own_2] = [z - y - x * b2, x * b1 - y - z];
         [
@@ -144,7 +167,7 @@ impl Step for Magnus {
 }
 
 /// Weight √3/12 of the commutator in the Magnus step, per square of the step's length, dimensionless.
-pub(in crate::strip) const COMMUTATOR: f64 = 0.144_337_567_297_406_43;
+const COMMUTATOR: f64 = 0.144_337_567_297_406_43;
 
 /// Derivative of the rise of the bend, between the Gauss points, by (bend, slope) at the first, then at the second.
 const RISE_BY_GAUSS: [f64; 4] = [-1.0, 0.0, 1.0, 0.0];
@@ -319,13 +342,13 @@ pub(in crate::strip) struct Twists {
 impl Twists {
     #[inline(always)]
     fn of<S: Step>(step: &S, cosine: Triple, cubic: Triple) -> Self {
-        let (phi, rho) = (step.rotation(), step.translation());
+        let (phi, rho) = (step.rotation(), step.chord().translation());
         let plain = 1.0 - cubic[0] * dot(phi, phi);
         let once = cross(phi, rho);
         let twice = cross(phi, once);
         let lead = three(|i| 2.0 * (cosine[1] * once[i] + cubic[1] * twice[i] - cubic[0] * rho[i]));
         let across = cubic[0] * dot(phi, rho);
-        let shift = step.translation_by_rise();
+        let shift = step.chord().by_rise();
         let (turned, along_shift) = (cross(phi, shift), cubic[0] * dot(phi, shift));
         let by_rise = three(|i| plain * shift[i] + cosine[0] * turned[i] + along_shift * phi[i]);
         let steps = step.rotation_by_gauss();
@@ -366,7 +389,7 @@ fn work<S: Step>(
     force: Triple,
     moment: Triple,
 ) -> ([f64; 4], Upper) {
-    let (phi, rho) = (step.rotation(), step.translation());
+    let (phi, rho) = (step.rotation(), step.chord().translation());
     let square = dot(phi, phi);
     let (phi_force, phi_rho) = (dot(phi, force), dot(phi, rho));
     let force_rho = dot(force, rho);
@@ -385,7 +408,7 @@ fn work<S: Step>(
             - 0.5 * cubic[0] * moment[i]
     });
     // Second derivatives by the rise, of which only the translation depends, and the rotation φ.
-    let shift = step.translation_by_rise();
+    let shift = step.chord().by_rise();
     let force_once = cross(phi, force);
     let force_twice = cross(phi, force_once);
     let lead = 2.0
@@ -401,7 +424,7 @@ fn work<S: Step>(
             + cosine[0] * dot(arm, steps[j])
             + cubic[0] * (phi_force * dot(shift, steps[j]) + along_shift * along_force[j])
     });
-    let by_rise_twice = step.translation_by_rise_twice()
+    let by_rise_twice = step.chord().by_rise_twice()
         * (force[1] - cosine[0] * force_once[1] + cubic[0] * force_twice[1]);
     let lever = four(|j| cross(force, twists.rotation[j]));
     let plain = 1.0 - cubic[0] * square;
