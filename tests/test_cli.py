@@ -320,6 +320,23 @@ def test_elements_too_long_for_the_width_are_warned_of(run, example):
     assert_one_line(err, "coarse.json", "warning", "80")
 
 
+def test_energy_of_the_file_gives_place_to_the_one_that_is_asked_for(run, example, tmp_path):
+    tables = example.to_dict()
+    tables["belt"]["thickness"] = 7e-4
+    file = tmp_path / "thick.json"
+    file.write_text(json.dumps(tables), "utf-8")
+    energies = {}
+    for energy in ("sadowsky", "shell"):
+        code, out, _ = run("solve", file, "--energy", energy, "--json")
+        found = json.loads(out)
+        assert (code, found["energy_model"]) == (0, energy)
+        energies[energy] = found["energy"]
+    assert energies["shell"] < energies["sadowsky"]
+    code, _, err = run("solve", file, "--energy", "plate")
+    assert code == 2
+    assert_one_line(err, "--energy", "'plate'", "'wunderlich'")
+
+
 def test_default_elements_are_not_warned_of(run, example_file):
     code, _, err = run("solve", example_file)
     assert (code, err) == (0, "")

@@ -9,7 +9,7 @@ import json
 import math
 from itertools import compress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import click
 
@@ -18,6 +18,7 @@ from fishbone import examples as shipped
 from fishbone.errors import FishboneError, NoBranch
 from fishbone.files import check_writable, write_whole
 from fishbone.follow import out_of_reach
+from fishbone.names import EnergyModel
 from fishbone.progress import progress
 
 if TYPE_CHECKING:
@@ -107,10 +108,18 @@ def command(context: click.Context) -> None:
     callback=_output(".stl", ".ply", ".obj", ".glb"),
     help="Write the surface: .stl, .ply, .obj or .glb.",
 )
+@click.option("--energy", type=click.Choice(get_args(EnergyModel)), help="The bending energy, in place of the file's.")
 @click.option("--all", "is_all", is_flag=True, help="Search for all equilibria, saddles included, not for one minimum.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON instead of a table.")
 def solve(  # noqa: PLR0913 - one for each option
-    file: Path, *, out: Path | None, figure: Path | None, mesh: Path | None, is_all: bool, as_json: bool
+    file: Path,
+    *,
+    out: Path | None,
+    figure: Path | None,
+    mesh: Path | None,
+    energy: EnergyModel | None,
+    is_all: bool,
+    as_json: bool,
 ) -> None:
     """Solve a scenario.
 
@@ -124,6 +133,8 @@ def solve(  # noqa: PLR0913 - one for each option
     pictures = _pictures(figure, mesh)
     _spare(file, out)
     scenario = fishbone.load(file)
+    if energy is not None:
+        scenario = fishbone.Scenario.from_dict(scenario.to_dict() | {"energy": energy})
     found = _all(scenario) if is_all else [_solved(scenario)]
     converged = [equilibrium for equilibrium in found if equilibrium.status == "converged"]
     # All contents are made before a file is written, so that a failure leaves no file behind.
