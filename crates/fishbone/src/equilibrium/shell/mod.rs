@@ -28,8 +28,9 @@ type ShellSolution = Solution<BeltPoint<FIELDS>>;
 
 /// Points across the width, a number: where ribs come nearly as close as they may, the energy taken at 6 is off by up to 1 %.
 const POINTS: usize = 8;
-/// First barriers of the search with the strong gauge, and with the weak one, in mean R_f/U.
-const BARRIERS: [f64; 2] = [1e-3, 1e-4];
+/// First barriers of the search with the strong gauge, then with the weak one, the last where the one before leads astray; in
+/// mean R_f/U.
+const BARRIERS: [f64; 3] = [1e-3, 1e-4, 1e-7];
 /// Error over its change on halving all elements: energies converge with the length of elements, dimensionless.
 const OVER_CHANGE: f64 = 2.0;
 /// Displacement of nodes up to which a minimum on a finer mesh is the same, in U.
@@ -350,22 +351,33 @@ fn from_shape(
     shape: &BeltPoint,
     proceed: &mut Proceed,
 ) -> (ShellProgram, ShellSolution) {
-    /// Iterations that the search with the strong gauge may take, a number: most take 10 to 60.
+    /// Iterations that a search may take, a number: most take 10 to 60.
     const ITERATIONS: usize = 300;
     let [strong, weak] =
         [Gauge::STRONG, Gauge::WEAK].map(|gauge| developable.as_shell(Shell::new(gauge, POINTS)));
-    let [wide, narrow] = BARRIERS.map(|barrier| settings(problem, barrier));
-    let wide = Settings {
+    let first = Settings {
         iterations: ITERATIONS,
-        ..wide
+        ..settings(problem, BARRIERS[0])
     };
-    let first = stagewise::minimise(&strong, &wide, start(&strong, shape), proceed);
-    let iterations = first.iterations;
-    if first.outcome != Outcome::Converged {
-        return (strong, first);
+    let near = stagewise::minimise(&strong, &first, start(&strong, shape), proceed);
+    if near.outcome != Outcome::Converged {
+        return (strong, near);
     }
-    let found = stagewise::minimise(&weak, &narrow, first.at.point, proceed);
-    (weak, found.after(iterations))
+    let mut iterations = near.iterations;
+    let mut found = near.clone();
+    for barrier in &BARRIERS[1..] {
+        let next = Settings {
+            iterations: ITERATIONS,
+            ..settings(problem, *barrier)
+        };
+        found = stagewise::minimise(&weak, &next, near.at.point.clone(), proceed);
+        iterations += found.iterations;
+        if matches!(found.outcome, Outcome::Converged | Outcome::Interrupted) {
+            break;
+        }
+    }
+    found.iterations = iterations;
+    (weak, found)
 }
 
 /// The fields of a developable shape with rib slopes so smooth that the ribs keep apart; the twist of the ribs keeps the
