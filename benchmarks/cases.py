@@ -113,7 +113,8 @@ def on_shell(name: str, energy: str) -> fb.Equilibrium:
     """The belt of a shell reference; a curved board has equilibria on both sides and bulges to the shell's side."""
     data = shell(name)
     turn = Rotation.from_matrix(data["end_rotation_matrix"]).as_rotvec()
-    tables = clamped(data["end_position"], turn, **{key: data[key] for key in ("length", "width")})
+    sheet = ("length", "width", "thickness", "poisson")
+    tables = clamped(data["end_position"], turn, **{key: data[key] for key in sheet})
     if "segments" not in data:
         return solve(tables, energy)
     tables["belt"]["segments"] = [_strip(length, curvature) for length, curvature in data["segments"]]
@@ -138,6 +139,11 @@ def shell_peak(name: str) -> Floats:
     line = curve(data["u"], data["position"], data["tangent"])
     fine = line(np.linspace(data["u"][0], data["u"][-1], 20_001))
     return np.asarray(fine[np.argmax(fine[:, 0])])
+
+
+def thick(tables: dict[str, Any], thickness: float = SHEET, poisson: float = 0.34) -> dict[str, Any]:
+    """Tables of the same belt with a thickness."""
+    return tables | {"belt": tables["belt"] | {"thickness": thickness, "poisson": poisson}}
 
 
 def distance_to_shell(name: str, energy: str) -> float:

@@ -28,6 +28,12 @@ def number(value: float, decimals: int) -> str:
     return f"{round(float(value), decimals) + 0.0:.{decimals}f}".replace("-", "−")
 
 
+def signed(value: float, decimals: int) -> str:
+    """A decimal number with its sign, but for 0."""
+    text = number(value, decimals)
+    return text if text.startswith("−") or float(text) == 0.0 else f"+{text}"
+
+
 def scientific(value: float, decimals: int = 1) -> str:
     """A number in powers of ten."""
     mantissa, exponent = f"{float(value):.{decimals}e}".split("e")

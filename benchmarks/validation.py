@@ -1,9 +1,13 @@
-"""Measures the tables of docs/validation.md, save those of ritz.py and random_poses.py."""
+"""Measures the tables of docs/validation.md, save those of ritz.py and random_poses.py.
+
+All of them, or those that the command line names.
+"""
 
 from __future__ import annotations
 
 import platform
 import statistics
+import sys
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,18 +30,20 @@ from cases import (
     gentle_arc,
     heavy,
     helix,
+    on_shell,
     orders,
     refine,
     shapes,
     shell,
     shell_peak,
     solve,
+    thick,
 )
 from fishbone import examples as shipped
-from tables import ROOT, number, scientific, table, vector, write
+from tables import ROOT, VALIDATION, number, scientific, signed, table, vector, write
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
 REFERENCE = {
     ("example1", "fishbone"): ("23.504", "(0.3691, 0.2500, 0.0500)"),
@@ -67,7 +73,11 @@ SHELL_CASES = (
 )
 GALLERY = ROOT / "docs" / "gallery.md"
 SHAPES = ROOT / "docs" / "shapes.md"
+STRIP = ROOT / "docs" / "strip-shell.md"
+ALL = (*ENERGIES, "shell")
+"""The energies, that of a strip of finite thickness included."""
 MESHES = (40, 80, 160, 320, 640, 1280)
+STRIP_MESHES = (40, 80, 160, 320, 640, 1280)
 REPETITIONS = 31
 
 
@@ -82,12 +92,13 @@ def reference_rows() -> Iterator[list[str]]:
 
 
 def shell_rows() -> Iterator[list[str]]:
-    """Distances from the shell in 1e-3 of its length."""
+    """Distances from the shell in 1e-3 of its length, its energy, and by how many per cent others are off."""
     for name in SHELL_CASES:
         data = shell(name)
         thickness = f"{data['thickness'] / SHEET:g} × {SHEET:g}"
-        distances = [number(1e3 * distance_to_shell(name, energy), 2) for energy in ENERGIES]
-        yield [f"`{name}`", thickness, *distances]
+        distances = [number(1e3 * distance_to_shell(name, energy), 2) for energy in ALL]
+        off = [100.0 * (on_shell(name, energy).energy / data["energy"] - 1.0) for energy in ALL]
+        yield [f"`{name}`", thickness, *distances, number(data["energy"], 3), *(signed(share, 2) for share in off)]
 
 
 def peak_rows() -> Iterator[list[str]]:
@@ -95,8 +106,9 @@ def peak_rows() -> Iterator[list[str]]:
     for factor, name in (("2 ×", "_2h"), ("", ""), ("1/2 ×", "_h2"), ("1/4 ×", "_h4")):
         title = f"shell, thickness {factor} {SHEET:g}".replace("  ", " ")
         yield [title, vector(shell_peak(f"example2{name}"), 3)]
-    for energy in reversed(ENERGIES):
-        yield [f"`{energy}`, 160 elements", vector(solve(example("example2"), energy, 160).highest_point.position, 3)]
+    for energy in reversed(ALL):
+        shape = solve(thick(example("example2")), energy, 160)
+        yield [f"`{energy}`, 160 elements", vector(shape.highest_point.position, 3)]
     yield ["the source prints", "(0.3, 0.4, −0.01)"]
 
 
@@ -211,6 +223,18 @@ def convergence_rows() -> Iterator[list[str]]:
         yield [f"{coarse} → {fine}", *cells]
 
 
+def strip_rows() -> Iterator[list[str]]:
+    """Changes from mesh to mesh with `shell`: of energy and spine, with the observed orders."""
+    found = [refine(thick(example(name)), "shell", STRIP_MESHES) for name in EXAMPLES]
+    for i, (coarse, fine) in enumerate(pairwise(STRIP_MESHES)):
+        cells = []
+        for refinement in found:
+            for changes in (refinement.energy, refinement.position):
+                order = "" if i == 0 else f" ({number(orders(changes)[i - 1], 1)})"
+                cells.append(scientific(changes[i]) + order)
+        yield [f"{coarse} → {fine}", *cells]
+
+
 def radius_rows() -> Iterator[list[str]]:
     """Least bend radius over the width and on the spine, and the radius of the area, example 1."""
     for elements in (80, 160, 320, 640, 1280):
@@ -259,33 +283,62 @@ def processor() -> str:
     return next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), platform.machine())
 
 
-def main() -> None:
-    """Writes all tables."""
-    by_energy = [f"`{energy}`" for energy in ENERGIES]
-    header = ["case", "reference", "highest point [U]", "80 elements", "highest point", "160 elements", "highest point"]
-    write("reference values", table(header, reference_rows()))
-    write("shell", table(["case", "thickness [U]", *by_energy], shell_rows()))
-    write("peak", table(["example 2", "highest point [U]"], peak_rows()))
-    header = ["d [U]", "elements", "energy", "height", "thrust", "error", "error", "error"]
-    write("elastica", table(header, elastica_rows()))
-    write("cylinder", table(["winding angle [rad]", *by_energy], cylinder_rows()))
-    header = ["case", "published or exact", "coarse mesh", "four times as fine"]
-    write("published", table(header, published_rows()))
-    header = ["scenario", "density", "energy", "least radius", "force at the start", "minimum", "iterations"]
-    write("gallery", table(header, gallery_rows()), GALLERY)
-    header = ["shape", "energy", "twist", "least radius", "force", "margin", "snaps there"]
-    write("shapes", table(header, shape_rows()), SHAPES)
-    header = [
-        "elements",
-        *(f"gentle arc, `{energy}`" for energy in ("fishbone", "wunderlich")),
-        *(f"example 1, {energy}" for energy in by_energy),
-    ]
-    write("convergence", table(header, convergence_rows()))
-    header = ["elements", *(text for energy in by_energy for text in (energy, "on the spine", "99 % of the area"))]
-    write("bend radius", table(header, radius_rows()))
+def write_timing() -> None:
+    """Writes the times, with the machine."""
     header = ["case", "iterations", "median [ms]", "least", "most"]
     machine = f"{processor()}, one thread, {REPETITIONS} solves each, fishbone {fb.__version__}."
     write("timing", f"{machine}\n\n{table(header, timing_rows())}")
+
+
+BY_ENERGY = [f"`{energy}`" for energy in ENERGIES]
+RADII = [text for energy in BY_ENERGY for text in (energy, "on the spine", "99 % of the area")]
+GENTLE = [f"gentle arc, `{energy}`" for energy in ("fishbone", "wunderlich")]
+SHARP = [f"example 1, {energy}" for energy in BY_ENERGY]
+SHELL_ENERGIES = ["energy of the shell", *(f"`{energy}` off by [%]" for energy in ALL)]
+STRIP_CHANGES = [f"{name}: {text}" for name in ("example 1", "example 2") for text in ("energy", "spine")]
+TABLES: dict[str, tuple[list[str], Callable[[], Iterator[list[str]]], Path]] = {
+    "reference values": (
+        ["case", "reference", "highest point [U]", "80 elements", "highest point", "160 elements", "highest point"],
+        reference_rows,
+        VALIDATION,
+    ),
+    "shell": (
+        ["case", "thickness [U]", *(f"`{energy}`" for energy in ALL), *SHELL_ENERGIES],
+        shell_rows,
+        VALIDATION,
+    ),
+    "peak": (["example 2", "highest point [U]"], peak_rows, VALIDATION),
+    "elastica": (
+        ["d [U]", "elements", "energy", "height", "thrust", "error", "error", "error"],
+        elastica_rows,
+        VALIDATION,
+    ),
+    "cylinder": (["winding angle [rad]", *BY_ENERGY], cylinder_rows, VALIDATION),
+    "published": (["case", "published or exact", "coarse mesh", "four times as fine"], published_rows, VALIDATION),
+    "gallery": (
+        ["scenario", "density", "energy", "least radius", "force at the start", "minimum", "iterations"],
+        gallery_rows,
+        GALLERY,
+    ),
+    "shapes": (
+        ["shape", "energy", "twist", "least radius", "force", "margin", "snaps there"],
+        shape_rows,
+        SHAPES,
+    ),
+    "convergence": (["elements", *GENTLE, *SHARP], convergence_rows, VALIDATION),
+    "bend radius": (["elements", *RADII], radius_rows, VALIDATION),
+    "strip": (["elements", *STRIP_CHANGES], strip_rows, STRIP),
+}
+
+
+def main() -> None:
+    """Writes all tables, or those that the command line names."""
+    for name in sys.argv[1:] or (*TABLES, "timing"):
+        if name == "timing":
+            write_timing()
+            continue
+        header, rows, page = TABLES[name]
+        write(name, table(header, rows()), page)
 
 
 if __name__ == "__main__":

@@ -17,7 +17,20 @@ from matplotlib.figure import Figure
 import fishbone as fb
 import ritz
 import shear
-from cases import ENERGIES, EXAMPLES, SHEET, apart, distance_to_shell, example, gentle_arc, refine, shapes, shell, solve
+from cases import (
+    ENERGIES,
+    EXAMPLES,
+    SHEET,
+    apart,
+    distance_to_shell,
+    example,
+    gentle_arc,
+    refine,
+    shapes,
+    shell,
+    solve,
+    thick,
+)
 from fishbone import chart, plot
 from fishbone.plot import VIEWER
 from tables import ROOT
@@ -46,6 +59,7 @@ LINES: dict[str, dict[str, Any]] = {
     "sadowsky": {"color": "0.35", "linestyle": "--", "marker": "s", "markersize": 4.0},
     "wunderlich": {"color": "0.0", "linestyle": "-.", "marker": "^", "markersize": 5.0, "markerfacecolor": "white"},
 }
+SHELL_LINE = {"color": "0.55", "linestyle": "-", "marker": "D", "markersize": 4.0}
 OPEN = {"color": "0.55", "linestyle": "-.", "marker": "v", "markersize": 5.0, "markerfacecolor": "white"}
 GENTLE = {"color": "0.55", "marker": "D", "markersize": 4.0}
 GALLERY = {
@@ -320,15 +334,50 @@ def shell_thickness() -> Figure:
     for i, axes in enumerate(figure.subplots(1, 2), start=1):
         names = [f"example{i}{suffix}" for suffix in ("_h4", "_h2", "", "_2h")]
         thickness = [shell(name)["thickness"] for name in names]
-        for energy in ENERGIES:
+        for energy, line in {**LINES, "shell": SHELL_LINE}.items():
             distance = [distance_to_shell(name, energy) for name in names]
-            axes.loglog(thickness, distance, label=energy, **LINES[energy])
+            axes.loglog(thickness, distance, label=energy, **line)
         axes.set_xticks(thickness, [f"{value / SHEET:g}" for value in thickness])
         axes.minorticks_off()
-        ticks = (5e-4, 1e-3, 2e-3) if i == 1 else (2e-3, 5e-3, 1e-2, 2e-2)
+        ticks = (1e-4, 2e-4, 5e-4, 1e-3, 2e-3) if i == 1 else (2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2)
         axes.set_yticks(ticks, [f"{1e3 * tick:g}" for tick in ticks])
         axes.set(xlabel="thickness of the shell [0.0007 U]", ylabel="RMS distance [1e-3 U]", title=f"Example {i}")
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    return figure
+
+
+def strip_ribs() -> Figure:
+    """Example 2 about its inflections: ribs on the flat board, torsion, and curvature across the spine."""
+    figure = Figure(figsize=(WIDTH, 4.4), layout="constrained")
+    rows = figure.subplots(4, 1, height_ratios=(1.0, 1.0, 2.2, 2.2), sharex=True)
+    tables = example("example2")
+    flat = solve(tables, "wunderlich", 160)
+    strips = {h: solve(thick(tables, h), "shell", 160) for h in (0.25 * SHEET, SHEET, 4.0 * SHEET)}
+    sheet = strips[SHEET]
+    reach = 0.5 * tables["belt"]["width"] * np.array([-1.0, 1.0])
+    drawn = {"wunderlich": flat, f"shell, h = {SHEET:g} U": sheet}
+    for axes, (name, belt) in zip(rows, drawn.items(), strict=False):
+        for u, slope in zip(belt.u[::2], belt.rib_slope[::2], strict=True):
+            axes.plot(u - slope * reach, reach, color="0.35", linewidth=0.5)
+        axes.plot((0.0, 1.0), (0.0, 0.0), color="0.0", linewidth=0.8)
+        axes.set(ylabel="v [U]", ylim=(-0.05, 0.05), yticks=(-0.05, 0.0, 0.05), title=f"Ribs on the flat board, {name}")
+    torsion, across = rows[2:]
+    for (h, belt), color in zip(strips.items(), ("0.72", "0.45", "0.0"), strict=True):
+        inside = belt.u[(belt.u > 0.02) & (belt.u < 0.98)]
+        found = belt.strain_at(np.column_stack([inside, 0.0 * inside]))
+        assert found is not None
+        label = f"shell, h = {h:g} U"
+        torsion.plot(belt.u, belt.torsion, color=color, label=label)
+        across.plot(inside, found.curvature[:, 1, 1], color=color, label=label)
+    torsion.plot(flat.u, flat.torsion, **plain("wunderlich"))
+    across.plot(flat.u, -(flat.rib_slope**2) * flat.bend, **plain("wunderlich"))
+    torsion.set(ylabel="torsion $ω_η$ [1/U]")
+    across.set(xlabel="u [U]", ylabel="$b_{vv}$ on the spine [1/U]", xlim=(0.0, 1.0))
+    # The bend changes its sign beside the clamp, too.
+    for inflection in sheet.u[np.flatnonzero(np.diff(np.sign(sheet.bend)))][1:]:
+        for axes in rows:
+            axes.axvline(inflection, color="0.6", linewidth=0.7, linestyle=":")
+    figure.legend(*across.get_legend_handles_labels(), loc="outside lower center", ncols=4)
     return figure
 
 
@@ -385,7 +434,7 @@ def main() -> None:
     with mpl.rc_context(STYLE | {"savefig.dpi": 150.0}):
         save(shear_diagrams(), "shear_diagrams")
     drawn = (examples, convergence, bound, bend_radius, continuation, hinge_there_and_back)
-    for draw in (*drawn, shell_thickness, collocation, locking):
+    for draw in (*drawn, shell_thickness, strip_ribs, collocation, locking):
         with mpl.rc_context(STYLE):
             save(draw(), draw.__name__)
 

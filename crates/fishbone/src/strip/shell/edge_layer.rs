@@ -17,7 +17,7 @@ const PSI: [f64; TERMS] = psi_series();
 ///
 /// `Ψ = 1 − (1−Φ) C/(C − 1 + Φ)` with `C = z/180`, where `Φ = (2/λ) (cosh λ − cos λ)/(sinh λ + sin λ)` is the share that a
 /// layer relieves of a cross-section that is not free to curl. It is the one function that makes the least energy over a
-/// uniform bend across the strip that of Audoly and Neukirch, Elasticity of a rod-like ribbon, 2021.
+/// uniform bend across the strip that of Audoly and Neukirch, A one-dimensional model for elastic ribbons, 2021.
 pub(crate) fn psi<T: DualNum<Primitive = f64> + Copy>(z: T) -> T {
     if z.re() < SERIES {
         let terms = PSI.iter().rev();
