@@ -27,6 +27,7 @@ docs/gallery
 
 docs/notation
 docs/theory
+docs/strip-shell
 docs/promises
 docs/validation
 docs/performance

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import re
 
+import numpy as np
 import pytest
 
 import fishbone as fb
+import validation
 from conftest import ROOT
 
 PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -98,11 +100,38 @@ def test_the_pages_have_the_counts_of_the_shapes_that_are_found():
 
 
 def test_the_readme_has_the_distances_from_the_shell_that_were_measured():
-    distances = {row[0]: row[2:] for row in block((ROOT / "docs" / "validation.md").read_text("utf-8"), "shell")}
+    distances = {row[0]: row[2:6] for row in block((ROOT / "docs" / "validation.md").read_text("utf-8"), "shell")}
     readme = (ROOT / "README.md").read_text("utf-8")
     for thickness, case in (("140 µm", "`example2`"), ("35 µm", "`example2_h4`")):
         [row] = re.findall(rf"^\| {thickness} \| (.+) \|$", readme, re.MULTILINE)
         assert row.split(" | ") == [f"{float(distance):.1f}e-3 U" for distance in distances[case]]
+
+
+def test_the_table_of_shells_has_all_of_them_and_what_the_page_says_of_it():
+    page = " ".join((ROOT / "docs" / "validation.md").read_text("utf-8").split())
+    rows = block((ROOT / "docs" / "validation.md").read_text("utf-8"), "shell")
+    shells = sorted(f"`{path.stem}`" for path in (ROOT / "tests" / "data" / "shell").glob("*.json"))
+    assert sorted(row[0] for row in rows) == shells
+    distances = np.array([row[2:6] for row in rows], dtype=float)
+    energies = np.array([[cell.replace("−", "-") for cell in row[7:]] for row in rows], dtype=float)
+    assert np.all(distances.argmin(axis=1) == 3)
+    assert f"{distances[:, 3].max():.1f}e-3 U at most" in page
+    off = f"{energies[:, 3].min():.1f} to {energies[:, 3].max():.1f} %".replace("-", "−")
+    assert off in page
+    note = " ".join((ROOT / "docs" / "strip-shell.md").read_text("utf-8").split())
+    assert off in note
+    assert f"{distances[:, 3].min():.2f}e-3 to {distances[:, 3].max():.1f}e-3 of the length" in note
+
+
+@pytest.mark.parametrize("name", ["example2", "curved_h8"])
+def test_the_table_of_shells_is_what_the_script_measures(name, monkeypatch):
+    monkeypatch.setattr(validation, "SHELL_CASES", (name,))
+    [found] = validation.shell_rows()
+    rows = block((ROOT / "docs" / "validation.md").read_text("utf-8"), "shell")
+    [written] = [row for row in rows if row[0] == found[0]]
+    assert written[1] == found[1]
+    numbers = np.array([[cell.replace("−", "-") for cell in row[2:]] for row in (written, found)], dtype=float)
+    np.testing.assert_allclose(*numbers, atol=0.021)
 
 
 @pages

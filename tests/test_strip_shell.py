@@ -33,6 +33,9 @@ from helpers import (
 
 DISTANCES = {
     "example1": 0.2e-3,
+    "example1_h2": 0.2e-3,
+    "example1_h4": 0.15e-3,
+    "example1_narrow": 0.12e-3,
     "example2": 0.6e-3,
     "offset05": 0.1e-3,
     "offset10_far": 0.12e-3,
@@ -96,6 +99,14 @@ def test_meshes_of_80_and_320_elements_agree(name: str) -> None:
     assert coarse.energy == pytest.approx(fine.energy, rel=1e-3)
     places = np.linspace(0.0, 1.0, 41)
     assert rms_distance(spine_at(coarse, places), spine_at(fine, places)) <= 1e-4
+
+
+def test_ribs_of_a_thick_strip_do_not_sway() -> None:
+    """At a thickness of a fiftieth of the width the slopes of ribs rise and fall by as much on any mesh."""
+    coarse, fine = (solve(thick(example2(elements=n), 2e-3)) for n in (80, 320))
+    assert coarse.energy == pytest.approx(fine.energy, rel=1e-3)
+    ways = [np.abs(np.diff(belt.rib_slope)).sum() for belt in (coarse, fine)]
+    assert ways[0] == pytest.approx(ways[1], rel=0.05)
 
 
 def test_reactions_are_derivatives_of_the_energy() -> None:
