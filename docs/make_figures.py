@@ -371,8 +371,8 @@ def strip_ribs() -> Figure:
         across.plot(inside, found.curvature[:, 1, 1], color=color, label=label)
     torsion.plot(flat.u, flat.torsion, **plain("wunderlich"))
     across.plot(flat.u, -(flat.rib_slope**2) * flat.bend, **plain("wunderlich"))
-    torsion.set(ylabel="torsion $ω_η$ [1/U]")
-    across.set(xlabel="u [U]", ylabel="$b_{vv}$ on the spine [1/U]", xlim=(0.0, 1.0))
+    torsion.set(ylabel="$ω_η$ [1/U]")
+    across.set(xlabel="u [U]", ylabel="$b_{vv}$ [1/U]", xlim=(0.0, 1.0))
     # The bend changes its sign beside the clamp, too.
     for inflection in sheet.u[np.flatnonzero(np.diff(np.sign(sheet.bend)))][1:]:
         for axes in rows:
