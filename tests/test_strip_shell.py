@@ -218,6 +218,20 @@ def test_thickness_is_needed_and_given_once() -> None:
         fb.Scenario.from_dict(twice)
 
 
+def test_strip_between_pins_hangs_in_its_plane_without_losing_its_stability() -> None:
+    """At its free ends the slopes of the ribs may change and leave the surface as it is: no motion that counts.
+
+    One of its modes is such a change of the description, and its energy falls.
+    """
+    pins = [{"at": "start", "position": list(ORIGIN)}, {"at": "end", "position": [-0.675, 0.241, 0.103]}]
+    belt = board([straight(1.0)], pins, width=0.159, elements=80, gravity=(0.741, 0.562, 0.057), density=1.0)
+    found = solve(thick(belt, 2.8e-3))
+    assert np.abs(found.torsion).max() < 1e-6
+    assert found.modes(1)[0].eigenvalue < -1e5
+    assert solve(belt).stable
+    assert found.stable
+
+
 def test_coarse_mesh_is_warned_of() -> None:
     """A fixed mesh of elements longer than V/8, and one whose error is above the accuracy."""
     long = solve(thick(example1(elements=40)))

@@ -270,6 +270,8 @@ def test_planar_arch_of_a_thin_strip_folds_where_the_elastica_does() -> None:
     fold = next(event for event in branch.events if event.kind == "fold" and event.negative_modes == (0, 1))
     assert fold.confirmed
     assert fold.parameter == pytest.approx(-1.1230897421, rel=0.02)
+    assert branch.equilibrium(fold.state - 2).stable
+    assert branch.equilibrium(fold.state + 2).stable is False
 
 
 def test_margin_of_a_planar_arch_is_its_fold() -> None:

@@ -290,6 +290,9 @@ fn hides_energy(problem: &Problem, program: &ShellProgram, solution: &ShellSolut
 }
 
 /// Stability of a solution by its second variation, on all motions that its scenario leaves.
+///
+/// With the weak gauge the slopes of ribs may change at a free end while the surface hardly does, at a change of the energy of
+/// either sign. Such motions of the description alone cost energy with the strong gauge, so that they do not count.
 fn stability(
     problem: &Problem,
     program: &ShellProgram,
@@ -299,11 +302,19 @@ fn stability(
     if status != Status::Converged {
         return None;
     }
-    let inertia = match left_free(problem, program, &solution.at) {
-        Some((program, at)) => assess(&program, problem.tolerance(), &at).inertia,
-        None => solution.inertia,
+    let free = left_free(problem, program, &solution.at);
+    let (program, at, own) = match &free {
+        Some((program, at)) => (program, at, None),
+        None => (program, &solution.at, solution.inertia),
     };
-    Some(inertia?.into())
+    let inertia = |program| assess(program, problem.tolerance(), at).inertia;
+    let own = own.or_else(|| inertia(program))?;
+    if own.negative == 0 {
+        return Some(own.into());
+    }
+    let mut strong = program.clone();
+    strong.model = Shell::new(Gauge::STRONG, POINTS);
+    Some(inertia(&strong)?.into())
 }
 
 /// Settings of a search with a first barrier, in mean R_f/U.
