@@ -43,7 +43,7 @@ use thiserror::Error;
 
 pub(crate) use intrinsic::of_solution;
 pub(crate) use lifted::flat_pose;
-pub(crate) use refinement::{largest_change, turns_too_far};
+pub(crate) use refinement::largest_change;
 
 named! {
     /// How a solve ended.

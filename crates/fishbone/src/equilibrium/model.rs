@@ -93,6 +93,15 @@ pub(crate) trait StripModel<const F: usize, const N: usize>: Density<F> {
         at: &Stationary<BeltPoint<F>>,
     ) -> Option<Mesh>;
 
+    /// Whether an equilibrium of a mesh is none of the belt: elements turn too far.
+    fn is_of_mesh_alone(
+        _problem: &Problem,
+        program: &BeltProgram<Self, F, N>,
+        shape: &BeltPoint<F>,
+    ) -> bool {
+        refinement::turns_too_far(program, shape)
+    }
+
     /// Whether the active sets of a programme depend on its shape.
     fn has_active_sets(_problem: &Problem, _program: &BeltProgram<Self, F, N>) -> bool {
         false

@@ -85,7 +85,7 @@ pub(crate) fn next_to(problem: &Problem, found: Equilibrium, proceed: &mut Proce
         iterations += better.iterations;
         let known = change(problem, (&program, &solution), (&finer, &better));
         let is_accurate = known.of_the_whole() <= problem.accuracy()
-            && !hides_energy(problem, &program, &solution);
+            && !hides_energy(problem, &program, &solution.at.point);
         error = OnceLock::from(Some(known).filter(MeshError::is_finite));
         if is_accurate {
             break;
@@ -105,7 +105,7 @@ pub(crate) fn next_to(problem: &Problem, found: Equilibrium, proceed: &mut Proce
 fn judged(problem: &Problem, program: ShellProgram, solution: ShellSolution) -> Equilibrium {
     // Which constraints follow from others does not depend on the energy.
     let redundant = intrinsic::redundant(problem, &problem.program(problem.elements()));
-    let is_hiding = hides_energy(problem, &program, &solution);
+    let is_hiding = hides_energy(problem, &program, &solution.at.point);
     let fault = is_hiding.then(|| HIDDEN.to_owned());
     let (status, message) =
         intrinsic::judge(problem, &program, &solution, fault, redundant.as_deref());
@@ -269,7 +269,7 @@ fn drawn_in(program: &ShellProgram, point: BeltPoint<FIELDS>) -> BeltPoint<FIELD
 
 /// Whether the energy of a shape changes as it is taken at more points along and across the belt: beside clamps, coarse elements
 /// may hide energy between their points.
-fn hides_energy(problem: &Problem, program: &ShellProgram, solution: &ShellSolution) -> bool {
+fn hides_energy(problem: &Problem, program: &ShellProgram, shape: &BeltPoint<FIELDS>) -> bool {
     /// Change of the energy that is no error of the integral, as a share of the energy.
     const CHANGE: f64 = 1e-3;
     /// Parts of an element along the belt, and points across it, a number.
@@ -278,14 +278,13 @@ fn hides_energy(problem: &Problem, program: &ShellProgram, solution: &ShellSolut
         return true;
     };
     finer.model = finer.model.with_points(FINER[1]);
-    let point = prolonged(program, &solution.at.point, &finer);
+    let point = prolonged(program, shape, &finer);
     let [own, true_one] = [
-        program.elastic_energy(&solution.at.point.fields),
+        program.elastic_energy(&shape.fields),
         finer.elastic_energy(&point.fields),
     ];
     // A change that is no number is no small one.
-    let is_small =
-        (own - true_one).abs() <= CHANGE * own.abs().max(program.size(&solution.at.point));
+    let is_small = (own - true_one).abs() <= CHANGE * own.abs().max(program.size(shape));
     !is_small
 }
 

@@ -2,9 +2,10 @@
 
 use super::{
     BARRIERS, HALVINGS, POINTS, Proceed, ShellProgram, ShellSolution, change, drawn_in, halved,
-    judged, prolonged, settings, shared_out, solve,
+    hides_energy, judged, prolonged, settings, shared_out, solve,
 };
 use crate::equilibrium::model::{AnyStationary, StripModel};
+use crate::equilibrium::refinement::turns_too_far;
 use crate::equilibrium::{AnySolved, Equilibrium, Solved, Status};
 use crate::problem::program::BeltPoint;
 use crate::problem::{Mesh, Problem};
@@ -145,6 +146,15 @@ impl StripModel<FIELDS, 12> for Shell {
             let error = change(problem, (program, &solution), (&finer, &better));
             error.of_the_whole() <= TOO_LARGE * problem.accuracy()
         })
+    }
+
+    /// As elements turn, or because energy hides from the mesh.
+    fn is_of_mesh_alone(
+        problem: &Problem,
+        program: &ShellProgram,
+        shape: &BeltPoint<FIELDS>,
+    ) -> bool {
+        turns_too_far(program, shape) || hides_energy(problem, program, shape)
     }
 
     /// The mesh of elements half as long.

@@ -3,14 +3,14 @@
 use super::Led;
 use super::way::Way;
 use crate::equilibrium::model::StripModel;
-use crate::equilibrium::{Equilibrium, Solved, Status, largest_change, turns_too_far};
+use crate::equilibrium::{Equilibrium, Solved, Status, largest_change};
 use crate::problem::Mesh;
 use stagewise::Distance;
 use std::ops::ControlFlow;
 
 impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
-    /// Goes on on another mesh where the present one carries the shape at the end of a way no more; not converged where elements
-    /// turn too far for a belt.
+    /// Goes on on another mesh where the present one carries the shape at the end of a way no more; not converged where this is an
+    /// equilibrium of its mesh alone.
     pub(super) fn follow_error(
         &mut self,
         way: &mut Way,
@@ -20,7 +20,7 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
         const GROWN: f64 = 1.5;
         let (program, point) = (self.follower.program(), self.point());
         let change = largest_change(program, point);
-        let is_far = turns_too_far(program, point);
+        let is_far = D::is_of_mesh_alone(&self.problem, program, point);
         let has_changed = way.jump > 0.0 || change > GROWN * self.watched;
         let is_watched = !self.is_graded_anew && has_changed;
         if !is_far && !is_watched {
