@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import copy
 import itertools
+import math
 from typing import Any
 
 import numpy as np
 import pytest
 
 import fishbone as fb
+from conftest import ROOT
 from helpers import (
     ORIGIN,
     Array,
@@ -307,3 +309,23 @@ def test_thinner_strips_are_led_as_the_inextensible_belt() -> None:
     limit = reaction(belt)
     off = [np.linalg.norm(reaction(thick(belt, h)) - limit) for h in (1.4e-3, 7e-4, 3.5e-4)]
     assert all(b < a for a, b in itertools.pairwise(off))
+
+
+def test_belt_led_past_a_pitchfork_goes_on_along_a_minimum() -> None:
+    """The board of the hinge is symmetric about its middle; opened beyond 20.7° it leans to a side."""
+    tables = fb.load(ROOT / "scenarios" / "hinge.toml").to_dict() | {"energy": "shell"}
+    poses = [
+        ([0.016 * math.sin(a), 0.016 + 0.016 * math.cos(a), 0.034], [0.0, 0.0, -a]) for a in np.radians([19.0, 21.3])
+    ]
+    tables["supports"][1] |= dict(zip(("position", "rotation"), poses[0], strict=True))
+    tables["solver"]["elements"] = 400
+    [branch] = fb.follow(fb.Scenario.from_dict(tables), fb.Poses(poses[1:], motion="screw"), snaps=True).branches
+    [event] = branch.events
+    assert (event.kind, event.negative_modes, event.confirmed) == ("pitchfork", (0, 1), True)
+    assert 19.0 + 2.3 * event.parameter == pytest.approx(20.7, abs=0.1)
+    assert False not in branch.stable
+    assert branch.stable[-1]
+    bend = [branch.equilibrium(state).bend for state in (0, -1)]
+    lean = [float(np.abs(b - b[::-1]).max() / np.abs(b).max()) for b in bend]
+    assert lean[0] < 1e-5
+    assert lean[1] > 0.1

@@ -41,11 +41,6 @@ pub trait Watch: Sync {
     fn report(&self, done: usize, planned: usize);
 }
 
-/// Runs one task after the other on this thread.
-pub fn one_by_one(count: usize, task: &(dyn Fn(usize) + Sync)) {
-    (0..count).for_each(task);
-}
-
 /// The equilibria of a problem, rising in energy: minima, and saddles with one or two
 /// negative modes.
 ///

@@ -176,11 +176,8 @@ pub(crate) fn snapped_from<D: StripModel<F, N>, const F: usize, const N: usize>(
         let solved = found.certified::<D, F, N>().ok();
         solved.map_or(f64::INFINITY, |solved| solved.at.point.distance(shape))
     };
-    let is_minimum = |found: &Equilibrium| {
-        let is_unstable =
-            found.stability.and_then(|stability| stability.is_stable()) == Some(false);
-        distance(found).is_finite() && !is_unstable
-    };
+    let is_minimum =
+        |found: &Equilibrium| distance(found).is_finite() && found.stable() != Some(false);
     let minima = found.into_iter().filter(is_minimum);
     minima.min_by(|a, b| distance(a).total_cmp(&distance(b)))
 }

@@ -441,8 +441,10 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Search<'_, D, F, N> {
             let point = &event.station.at.point;
             solved.map_or(f64::INFINITY, |solved| solved.at.point.distance(point))
         };
+        // Beside a pitchfork the saddle is nearer than the minima.
         let found = descended.into_iter().chain(others);
-        let equilibrium = found.min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+        let minima = found.filter(|found| found.stable() != Some(false));
+        let equilibrium = minima.min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
         let solved: &Solved<D, F, N> = equilibrium.solved_on_mesh()?;
         let objective = solved.values.objective;
         let rate = before.map_or(0.0, |before| {

@@ -17,7 +17,9 @@ use crate::scenario::EnergyModel;
 use crate::strip::density::Density;
 use crate::strip::shell::{FIELDS, Gauge, Shell, interpolated, slope_step};
 use nalgebra::SVector;
-use stagewise::{Distance, Multipliers, Outcome, Program, Settings, Solution, Stationary, assess};
+use stagewise::{
+    Distance, Multipliers, Outcome, Program, Settings, Solution, Stationary, assess, lowest_modes,
+};
 use std::ops::ControlFlow;
 use std::sync::OnceLock;
 
@@ -66,8 +68,9 @@ pub(crate) fn next_to(problem: &Problem, found: Equilibrium, proceed: &mut Proce
         Some(from_developable(problem, &bare, &shape, proceed))
     };
     let mesh = Mesh::uniform(problem, problem.elements());
-    let (mut program, mut solution) =
-        from_start(&mesh, proceed).expect("a division for every stretch");
+    let (mut program, mut solution) = through_coarse(problem, &mesh, from_start, proceed)
+        .or_else(|| from_start(&mesh, proceed))
+        .expect("a division for every stretch");
     let mut iterations = found.iterations + solution.iterations;
     let mut error = OnceLock::new();
     for _ in 0..HALVINGS {
@@ -84,7 +87,9 @@ pub(crate) fn next_to(problem: &Problem, found: Equilibrium, proceed: &mut Proce
         };
         iterations += better.iterations;
         let known = change(problem, (&program, &solution), (&finer, &better));
-        let is_accurate = known.of_the_whole() <= problem.accuracy()
+        let is_accurate = known
+            .worst()
+            .is_some_and(|(_, error)| error <= problem.accuracy())
             && !hides_energy(problem, &program, &solution.at.point);
         error = OnceLock::from(Some(known).filter(MeshError::is_finite));
         if is_accurate {
@@ -99,6 +104,30 @@ pub(crate) fn next_to(problem: &Problem, found: Equilibrium, proceed: &mut Proce
         error,
         ..judged(problem, program, solution)
     }
+}
+
+/// The minimum on a fine mesh next to that of a coarse one; `None` on a coarse mesh, and where none is found.
+fn through_coarse(
+    problem: &Problem,
+    mesh: &Mesh,
+    from_start: impl Fn(&Mesh, &mut Proceed) -> Option<(ShellProgram, ShellSolution)>,
+    proceed: &mut Proceed,
+) -> Option<(ShellProgram, ShellSolution)> {
+    let coarse = Mesh::uniform(problem, problem.scenario().default_elements());
+    if mesh.elements() <= 2 * coarse.elements() {
+        return None;
+    }
+    let (program, solution) = from_start(&coarse, proceed)
+        .filter(|(_, solution)| solution.outcome == Outcome::Converged)?;
+    let finer = problem.program_on(mesh)?.as_shell(program.model.clone());
+    let point = drawn_in(&finer, prolonged(&program, &solution.at.point, &finer));
+    let settings = Settings {
+        iterations: FEW,
+        ..settings(problem, BARRIERS[1])
+    };
+    let found = stagewise::minimise(&finer, &settings, point, proceed);
+    let iterations = solution.iterations + found.iterations;
+    (found.outcome == Outcome::Converged).then(|| (finer, found.after(iterations)))
 }
 
 /// The equilibrium of a solution of a problem's programme, which has converged only if no energy hides from its mesh.
@@ -291,13 +320,16 @@ fn hides_energy(problem: &Problem, program: &ShellProgram, shape: &BeltPoint<FIE
 /// Stability of a solution by its second variation, on all motions that its scenario leaves.
 ///
 /// With the weak gauge the slopes of ribs may change at a free end while the surface hardly does, at a change of the energy of
-/// either sign. Such motions of the description alone cost energy with the strong gauge, so that they do not count.
+/// either sign. Such motions of the description alone do not count: they cost energy with the strong gauge, and their
+/// eigenvalue, over the square of a small displacement, is far below any of the belt's.
 fn stability(
     problem: &Problem,
     program: &ShellProgram,
     solution: &ShellSolution,
     status: Status,
 ) -> Option<Stability> {
+    /// Eigenvalue below those of the belt's own motions, in mean R_f/U³; its own go down to some hundreds.
+    const LEAST: f64 = -1e4;
     if status != Status::Converged {
         return None;
     }
@@ -307,13 +339,21 @@ fn stability(
         None => (program, &solution.at, solution.inertia),
     };
     let inertia = |program| assess(program, problem.tolerance(), at).inertia;
-    let own = own.or_else(|| inertia(program))?;
+    let mut own = own.or_else(|| inertia(program))?;
     if own.negative == 0 {
         return Some(own.into());
     }
     let mut strong = program.clone();
     strong.model = Shell::new(Gauge::STRONG, POINTS);
-    Some(inertia(&strong)?.into())
+    let dearer = own.negative.saturating_sub(inertia(&strong)?.negative);
+    if dearer > 0 {
+        let modes = lowest_modes(program, &mut at.clone(), own.negative).ok()?;
+        let scales = program.scales();
+        let least = LEAST * scales.objective / scales.distance.powi(2);
+        let below = modes.iter().filter(|mode| mode.eigenvalue < least);
+        own.negative -= below.count().min(dearer);
+    }
+    Some(own.into())
 }
 
 /// Settings of a search with a first barrier, in mean R_f/U.
