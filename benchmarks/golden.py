@@ -117,8 +117,7 @@ def _case(equilibrium: fb.Equilibrium, nodes: int = NODES) -> Case:
 
 def _changed(scenario: fb.Scenario, energy: str | None = None, **solver: Any) -> fb.Scenario:
     """The scenario with another energy, and other settings of the solver."""
-    tables = scenario.to_dict()
-    tables["energy"] = energy or tables["energy"]
+    tables = scenario.to_dict() | ({} if energy is None else {"energy": energy})
     tables["solver"] = tables.get("solver", {}) | solver
     return fb.Scenario.from_dict(tables)
 

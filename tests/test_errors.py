@@ -183,8 +183,8 @@ CASES = {
     ),
     "path of no number": (
         fb.NoPath,
-        lambda: fb.follow(scenario(), {"energy": 1.0}),
-        {"reason": "no_number", "field": "energy", "found": '"wunderlich"'},
+        lambda: fb.follow(scenario(), {"solver.method": 1.0}),
+        {"reason": "no_number", "field": "solver.method", "found": '"intrinsic"'},
     ),
     "path to where it is": (fb.NoPath, lambda: fb.follow(scenario(), {TURN: 0.0}), {"reason": "nothing"}),
     "path of a pin": (

@@ -217,6 +217,7 @@ def test_material_gives_the_rigidity_of_a_plate_strip() -> None:
     """R_f = D V = E t³ V/(12 (1 − ν²)): rigidity of the whole width (MODEL §1, CONTRACT)."""
     young, poisson, thickness, width = 3.2e9, 0.34, 140e-6, 0.02
     by_material = clamped((0.0, 0.1, 0.02), length=0.2, width=width, rigidity=None, elements=80)
+    by_material["energy"] = "wunderlich"
     by_material["belt"]["material"] = {"young": young, "poisson": poisson, "thickness": thickness}
     rigidity = young * thickness**3 * width / (12.0 * (1.0 - poisson**2))
     by_number = clamped((0.0, 0.1, 0.02), length=0.2, width=width, rigidity=rigidity, elements=80)

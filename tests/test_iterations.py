@@ -11,15 +11,15 @@ import fishbone as fb
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 ITERATIONS = {
     "bent": 19,
-    "cantilever": 14,
+    "cantilever": 44,
     "curl": 18,
     "curved": 24,
     "example1": 19,
     "example2": 31,
-    "hinge": 83,
+    "hinge": 116,
     "mobius": 92,
     "planar": 10,
-    "polystyrene": 25,
+    "polystyrene": 59,
     "twist": 65,
 }
 """Iterations over all attempts, as of the last intended change of the solver."""

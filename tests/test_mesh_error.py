@@ -260,8 +260,8 @@ def test_only_a_fixed_mesh_is_advised_to_be_left_out(solver: dict[str, Any], wid
     assert ("leave out solver.elements" in found.message) == bool(solver)
 
 
-def hinge(tolerance: float, elements: int | None) -> fb.Equilibrium:
-    tables = fb.load(ROOT / "scenarios" / "hinge.toml").to_dict()
+def hinge(tolerance: float, elements: int | None, energy: str = "shell") -> fb.Equilibrium:
+    tables = fb.load(ROOT / "scenarios" / "hinge.toml").to_dict() | {"energy": energy}
     tables["solver"] |= {"tolerance": tolerance, "elements": elements}
     tables["solver"] = {key: value for key, value in tables["solver"].items() if value is not None}
     return fb.solve(fb.Scenario.from_dict(tables))
@@ -277,12 +277,15 @@ def test_a_lower_tolerance_leaves_the_mesh_and_the_estimate_as_they_are(elements
     np.testing.assert_allclose(fine.error, coarse.error, rtol=1e-3)
 
 
-@pytest.mark.parametrize("elements", [300, 1000, 4000])
-def test_the_lowest_tolerance_is_met_on_every_mesh(elements: int) -> None:
-    found = hinge(1e-13, elements)
+@pytest.mark.parametrize(
+    ("energy", "elements"),
+    [("wunderlich", 300), ("wunderlich", 1000), ("wunderlich", 4000), ("shell", 300), ("shell", 1000)],
+)
+def test_the_lowest_tolerance_is_met_on_every_mesh(energy: str, elements: int) -> None:
+    found = hinge(1e-13, elements, energy)
     assert found.status == "converged"
     assert max(found.residuals) <= 1e-13
-    assert found.energy == pytest.approx(hinge(1e-8, elements).energy, rel=1e-8)
+    assert found.energy == pytest.approx(hinge(1e-8, elements, energy).energy, rel=1e-8)
 
 
 def pulled(tolerance: float) -> fb.Equilibrium:

@@ -108,7 +108,7 @@ impl Equilibrium {
 
     #[getter]
     fn energy_model(&self) -> &'static str {
-        self.solved.scenario().energy.name()
+        self.solved.scenario().energy_model().name()
     }
 
     /// Units: rad.

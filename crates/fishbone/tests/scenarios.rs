@@ -66,12 +66,13 @@ fn test_example_2_is_that_of_an_independent_solver() {
 }
 
 #[test]
-fn test_polystyrene_sheet_is_example_1_in_si_with_the_plates_energy() {
+fn test_polystyrene_sheet_is_example_1_in_si_with_the_energy_of_its_thickness() {
     let equilibrium = solved(include_str!("../../../scenarios/polystyrene.toml"));
     assert_minimum(&equilibrium);
     let rigidity = 3.2e9 * 140e-6f64.powi(3) * 0.02 / (12.0 * (1.0 - 0.34f64.powi(2)));
-    assert_near(equilibrium.energy * 0.2 / rigidity, 23.60, 0.003 * 23.60);
-    assert_near(equilibrium.highest_point().position.x / 0.2, 0.3684, 3e-3);
+    // That of shell finite elements; a developable plate has 23.60.
+    assert_near(equilibrium.energy * 0.2 / rigidity, 22.974, 0.003 * 22.974);
+    assert_near(equilibrium.highest_point().position.x / 0.2, 0.3685, 3e-3);
 }
 
 #[test]
@@ -112,13 +113,13 @@ fn test_boards_loads_curls_and_closed_belts_are_those_of_finer_meshes() {
         },
         Golden {
             text: include_str!("../../../scenarios/hinge.toml"),
-            energy: 1.4838e-4,
-            highest: [-0.0205, 0.2553, 0.3286],
+            energy: 1.2775e-4,
+            highest: [-0.0208, 0.2551, 0.3309],
         },
         Golden {
             text: include_str!("../../../scenarios/cantilever.toml"),
-            energy: -4.722e-5,
-            highest: [0.0307, 0.0994, 0.0198],
+            energy: -5.2392e-5,
+            highest: [0.0305, 0.0987, 0.0197],
         },
         Golden {
             text: include_str!("../../../scenarios/curl.toml"),

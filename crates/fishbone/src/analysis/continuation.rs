@@ -2,6 +2,7 @@
 
 mod confirm;
 mod flat;
+mod known;
 mod search;
 mod trace;
 

@@ -225,7 +225,7 @@ mod tests {
         let mut belt = BeltSpec::new(0.1, 1.0, vec![SegmentSpec::straight(1.0)]);
         belt.density = 1.0;
         let mut scenario = Scenario::new(belt);
-        scenario.energy = energy;
+        scenario.energy = Some(energy);
         let mut clamp = SupportSpec::new(Place::Start);
         clamp.position = Some([Component::Held(0.0); 3]);
         clamp.rotation = Some([0.0; 3]);

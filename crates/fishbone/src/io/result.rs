@@ -196,7 +196,7 @@ impl<'a> Record<'a> {
             warnings: equilibrium.warnings_with(crosses_itself),
             energy: equilibrium.energy,
             elastic_energy: equilibrium.elastic_energy,
-            energy_model: equilibrium.scenario().energy,
+            energy_model: equilibrium.scenario().energy_model(),
             u: &spine.u,
             position: spine.pose.iter().map(|p| p.position.into()).collect(),
             frame: spine.pose.iter().map(|p| row_major(&p.frame)).collect(),

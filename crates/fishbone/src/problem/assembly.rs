@@ -44,7 +44,7 @@ impl Problem {
     }
 
     fn program_of(&self, pieces: Vec<program::Piece>) -> BeltProgram {
-        let mut bare = BeltProgram::new(pieces, self.scenario.energy.developable());
+        let mut bare = BeltProgram::new(pieces, self.scenario.energy_model().developable());
         bare.half_turns = self.belt.half_turns;
         let places = Places::of(&bare);
         let mut supports: Vec<_> = self

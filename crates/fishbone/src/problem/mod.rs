@@ -114,13 +114,13 @@ impl Problem {
 
     /// Whether the belt is a strip of finite thickness.
     pub(crate) fn is_of_shell(&self) -> bool {
-        self.scenario.energy == EnergyModel::Shell
+        self.scenario.energy_model() == EnergyModel::Shell
     }
 
     /// The same problem with another energy of the same belt.
     pub(crate) fn with_energy(&self, energy: EnergyModel) -> Self {
         let mut scenario = Scenario::clone(&self.scenario);
-        scenario.energy = energy;
+        scenario.energy = Some(energy);
         Self {
             scenario: Arc::new(scenario),
             ..self.clone()

@@ -22,7 +22,7 @@ pub(crate) fn solve(
         width_over_length: problem.belt().width / length,
         end_position: to_end.position / length,
         end_orientation: Orientation::as_in_source(&to_end.frame),
-        energy: scenario.energy.developable(),
+        energy: scenario.energy_model().developable(),
         bulge: side(start, &to_end, &problem.bulge()),
     };
     let options = Options::from(&scenario.solver.ritz);

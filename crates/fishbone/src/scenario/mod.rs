@@ -30,13 +30,27 @@ impl Scenario {
     pub fn new(belt: BeltSpec) -> Self {
         Self {
             name: String::new(),
-            energy: EnergyModel::default(),
+            energy: None,
             belt,
             supports: Vec::new(),
             links: Vec::new(),
             loads: LoadsSpec::default(),
             solver: SolverSpec::default(),
         }
+    }
+
+    /// The energy of the bent belt: as named, else that of the most that is known of the belt.
+    ///
+    /// The source's own method knows no thickness.
+    pub fn energy_model(&self) -> EnergyModel {
+        let knows_thickness =
+            self.solver.method == Method::Intrinsic && self.belt.stretching().is_some();
+        let default = if knows_thickness {
+            EnergyModel::Shell
+        } else {
+            EnergyModel::Wunderlich
+        };
+        self.energy.unwrap_or(default)
     }
 
     /// Number of elements of a mesh that is to suit many shapes: the solver's own, or 8 U/V and at least 80.

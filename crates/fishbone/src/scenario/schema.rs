@@ -12,9 +12,9 @@ table! {
         /// Name for people, as in titles of figures.
         #[serde(default)]
         pub name: String,
-        /// Energy of the bent belt.
-        #[serde(default)]
-        pub energy: EnergyModel,
+        /// Energy of the bent belt. Default: "shell" where a thickness is known, else "wunderlich".
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub energy: Option<EnergyModel>,
         /// The belt itself, in its flat, unloaded state.
         pub belt: BeltSpec,
         /// What holds the belt, in the order of `at`. Without any, the start is held in the natural pose.
@@ -302,14 +302,13 @@ table! {
 
 named! {
     /// The energy of the bent belt.
-    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
     pub enum EnergyModel {
         /// Developable belt, the source's: R_f/2 · sqrt(1+β²) · κ₁², Eq. (34).
         Fishbone = "fishbone",
         /// Developable belt, the narrow limit of the plate: R_f/2 · κ₁².
         Sadowsky = "sadowsky",
         /// Developable plate of finite width.
-        #[default]
         Wunderlich = "wunderlich",
         /// Plate of finite width and thickness, which may stretch.
         Shell = "shell",

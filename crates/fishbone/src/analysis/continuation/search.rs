@@ -1,13 +1,13 @@
 //! The search for a diagram: a branch is traced, then the branches that cross it at its events.
 
 use super::confirm::is_confirmed;
+use super::known::lies_between;
 use super::trace::{Crossing, Stretch, trace};
-use super::{Branch, CrossingSettings, Diagram, End, Event, Kind, Origin, Snapped, State};
+use super::{Branch, Diagram, End, Event, Kind, Origin, Snapped, State};
 use crate::analysis::family::{Along, Station};
-use crate::analysis::symmetry::{SAME, are_images, sampled};
+use crate::analysis::symmetry::{SAME, are_images};
 use crate::equilibrium::model::{StripModel, snapped_from};
 use crate::equilibrium::{Equilibrium, Solved};
-use crate::geometry::Pose;
 use crate::problem::Mesh;
 use stagewise::{Distance, Events, Family, Pace, Turn};
 use std::marker::PhantomData;
@@ -229,6 +229,8 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Search<'_, D, F, N> {
         stretch: &Stretch<D, F, N>,
         led: Option<f64>,
     ) -> Found<F, N> {
+        /// Distances past an event at which a minimum is sought, in the first one.
+        const FARTHER: [f64; 3] = [1.0, 10.0, 100.0];
         let crossing = self.crossing(event, &stretch.stations[..state], &stretch.family);
         let before = state.checked_sub(1).map(|before| &stretch.stations[before]);
         let is_loss = event.negative[0] == 0 && event.negative[1] > 0;
@@ -236,9 +238,12 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Search<'_, D, F, N> {
             let onwards = before.map_or(1.0, |before| event.parameter - before.parameter);
             self.diagram.settings.crossings.past * onwards.signum()
         });
-        let landed = (is_loss || led.is_some())
-            .then(|| self.landed(event, &crossing, before, past, &stretch.family))
-            .flatten();
+        // Just past an event the second variation may be too small to tell a minimum from a saddle.
+        let goes_on = is_loss || led.is_some();
+        let farther = FARTHER.iter().filter(|_| goes_on);
+        let landed = farther
+            .map(|times| times * past)
+            .find_map(|past| self.landed(event, &crossing, before, past, &stretch.family));
         let pace = self.pace;
         let ask = &mut |station: &Station<F, N>| (self.proceed)(branch, station.parameter);
         let confirmed = is_confirmed(stretch, state, event, pace, ask);
@@ -522,42 +527,4 @@ fn kind<const F: usize, const N: usize>(
         (Turn::Bifurcation, 1) if crossing.len() == 2 => Kind::Transcritical,
         (Turn::Bifurcation, _) => Kind::Pitchfork,
     }
-}
-
-/// Whether a station of a family lies between two states of a branch.
-fn lies_between<D: StripModel<F, N>, const F: usize, const N: usize>(
-    family: &Along<D, F, N>,
-    station: &Station<F, N>,
-    [a, b]: [&State; 2],
-    settings: &CrossingSettings,
-) -> bool {
-    let share = (station.parameter - a.place) / (b.place - a.place);
-    let is_as_stable = [a, b].map(|state| state.negative_modes == station.negative);
-    (0.0..=1.0).contains(&share) && is_as_stable.contains(&true) && {
-        let Some(nodes) = family.at(station.parameter).map(|program| program.nodes()) else {
-            return false;
-        };
-        let [Some(from), Some(to)] = [a, b].map(|state| poses_at(family, state, &nodes)) else {
-            return false;
-        };
-        let ends = || from.iter().zip(&to).map(|(a, b)| (a.position, b.position));
-        let between = ends().zip(&station.at.point.poses);
-        let off = between.map(|((a, b), pose)| (pose.position - a.lerp(&b, share)).norm());
-        let moved = ends().map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
-        off.fold(0.0, f64::max) < settings.on_branch + settings.sag * moved
-    }
-}
-
-/// The poses of a state at places of the spine, arc lengths in U; `None` where the state's mesh is none of the family's path.
-fn poses_at<D: StripModel<F, N>, const F: usize, const N: usize>(
-    family: &Along<D, F, N>,
-    state: &State,
-    places: &[f64],
-) -> Option<Vec<Pose>> {
-    let poses = state.at.poses();
-    if *state.mesh == family.mesh {
-        return Some(poses.to_vec());
-    }
-    let own = family.on((*state.mesh).clone()).at(state.place)?;
-    Some(sampled(poses, &own.nodes(), places))
 }

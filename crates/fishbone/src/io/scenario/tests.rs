@@ -142,14 +142,53 @@ fn materials_in_the_documentation_are_those_of_the_code() {
 #[test]
 fn examples_of_the_source_name_the_energy_of_the_source_and_others_take_the_default() {
     for (name, _) in SHIPPED {
-        let source = name.starts_with("example");
-        let energy = if source {
-            EnergyModel::Fishbone
-        } else {
-            EnergyModel::Wunderlich
+        let energy = match name {
+            "example1" | "example2" => EnergyModel::Fishbone,
+            "cantilever" | "hinge" | "polystyrene" => EnergyModel::Shell,
+            _ => EnergyModel::Wunderlich,
         };
-        assert_eq!(shipped(name).energy, energy);
+        assert_eq!(shipped(name).energy_model(), energy, "{name}");
     }
+}
+
+#[test]
+fn energy_that_is_not_named_is_that_of_the_thickness_if_one_is_known() {
+    let scenario = |head: &str, belt: &str, tail: &str| {
+        let segments = r#"segments = [{ kind = "straight", length = 1.0 }]"#;
+        let text = format!("{head}\n[belt]\nwidth = 0.1\n{belt}\n{segments}\n{tail}");
+        Scenario::from_toml(&text).unwrap()
+    };
+    let energy = |head, belt| scenario(head, belt, "").energy_model();
+    let sheet = r#"material = { preset = "PET", thickness = 1e-4 }"#;
+    let layers = r#"layers = [{ material = "polyimide", thickness = 25e-6 }]"#;
+    let thick = "rigidity = 1.0\nthickness = 1e-4";
+    assert_eq!(energy("", "rigidity = 1.0"), EnergyModel::Wunderlich);
+    for known in [sheet, layers, thick] {
+        assert_eq!(energy("", known), EnergyModel::Shell);
+        assert_eq!(
+            energy("energy = \"sadowsky\"", known),
+            EnergyModel::Sadowsky
+        );
+    }
+    let by_ritz = r#"
+        [[supports]]
+        at = "start"
+        position = [0.0, 0.0, 0.0]
+        rotation = [0.0, 0.0, 0.0]
+        [[supports]]
+        at = "end"
+        position = [0.0, 0.5, 0.1]
+        rotation = [0.0, 0.0, 0.0]
+        [solver]
+        method = "ritz"
+    "#;
+    assert_eq!(
+        scenario("", sheet, by_ritz).energy_model(),
+        EnergyModel::Wunderlich
+    );
+    let written = scenario("", sheet, "").to_json();
+    assert!(!written.contains("energy"), "{written}");
+    assert_eq!(Scenario::from_json(&written).unwrap().energy, None);
 }
 
 #[test]
@@ -190,7 +229,7 @@ fn defaults_are_those_of_the_contract() {
     let least = r#"belt = { width = 0.1, rigidity = 1.0, segments = [{ kind = "straight", length = 1.0 }] }"#;
     let scenario = Scenario::from_toml(least).unwrap();
     assert_eq!(scenario.name, "");
-    assert_eq!(scenario.energy, EnergyModel::Wunderlich);
+    assert_eq!(scenario.energy_model(), EnergyModel::Wunderlich);
     assert_eq!(scenario.belt.natural_bend, 0.0);
     assert_eq!(scenario.belt.density, 0.0);
     assert!(!scenario.belt.closed);

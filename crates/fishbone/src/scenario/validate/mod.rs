@@ -52,7 +52,8 @@ impl Scenario {
     }
 
     fn check_energy(&self) -> Check {
-        let is_known = self.energy != EnergyModel::Shell || self.belt.stretching().is_some();
+        let is_known =
+            self.energy_model() != EnergyModel::Shell || self.belt.stretching().is_some();
         require(is_known, format_args!("energy"), || {
             (
                 "\"shell\" of a belt without a thickness",
@@ -98,7 +99,7 @@ impl Scenario {
     fn check_ritz(&self, length: f64) -> Check {
         let refused = [
             (
-                self.energy == EnergyModel::Shell,
+                self.energy_model() == EnergyModel::Shell,
                 "energy = \"shell\"",
                 "an energy of developable belts",
             ),
