@@ -1,4 +1,4 @@
-"""Measures the tables of docs/validation.md, save those of ritz.py and random_poses.py.
+"""Measures the tables of docs/validation.md, save those of ritz.py, random_poses.py and peers.py.
 
 All of them, or those that the command line names.
 """

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 import fishbone as fb
+import peers
 import validation
+from cases import shell
 from conftest import ROOT
 
 PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -132,6 +134,15 @@ def test_the_table_of_shells_is_what_the_script_measures(name, monkeypatch):
     assert written[1] == found[1]
     numbers = np.array([[cell.replace("−", "-") for cell in row[2:]] for row in (written, found)], dtype=float)
     np.testing.assert_allclose(*numbers, atol=0.021)
+
+
+def test_the_table_of_peers_is_what_the_script_measures():
+    rows = block((ROOT / "docs" / "validation.md").read_text("utf-8"), "peers")
+    assert [row[0] for row in rows] == list(peers.PEERS)
+    name = peers.POSES[2]
+    for row in rows[:-1]:  # the last needs MuJoCo
+        found = peers.off(peers.PEERS[row[0]](name), shell(name))
+        assert float(row[3]) == pytest.approx(found, abs=0.011)
 
 
 @pages

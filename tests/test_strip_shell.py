@@ -6,6 +6,7 @@ The shells are an independent finite-element computation (data/README.md).
 from __future__ import annotations
 
 import itertools
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -30,6 +31,11 @@ from helpers import (
     thick,
     thick_shell_scenario,
 )
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from helpers import Json
 
 DISTANCES = {
     "example1": 0.2e-3,
@@ -239,3 +245,26 @@ def test_coarse_mesh_is_warned_of() -> None:
     belt = thick(example1(elements=80))
     fine = solve({**belt, "solver": {**belt["solver"], "accuracy": 1e-6}})
     assert any("is above solver.accuracy, 1e-6" in warning for warning in fine.warnings)
+
+
+def ribbon_density(bend: Array, torsion: Array, thickness: float, width: float, poisson: float) -> Array:
+    """Energy per length of Audoly and Neukirch's ribbon over D V."""
+    size = (3.0 * (1.0 - poisson**2)) ** 0.25 * np.sqrt(np.abs(bend) / thickness) * width
+    edges = 2.0 / size * (np.cosh(size) - np.cos(size)) / (np.sinh(size) + np.sin(size))
+    across = torsion**2 / bend
+    return np.asarray(0.5 * ((bend + across) ** 2 - (poisson * bend + across) ** 2 * edges))
+
+
+@pytest.mark.parametrize("make", [example1, example2])
+def test_the_narrow_limit_is_the_ribbon_of_audoly_and_neukirch(make: Callable[..., Json]) -> None:
+    """V to 0 with V²/h as it is: gradients along the spine vanish, the curl of the edges stays."""
+    off = []
+    for narrower in (0.4, 0.2, 0.1):
+        tables = thick(make(elements=160), 7e-4 * narrower**2, 0.34)
+        tables["belt"]["width"] *= narrower
+        found = solve(tables)
+        middles = [0.5 * (field[1:] + field[:-1]) for field in (found.bend, found.torsion)]
+        density = ribbon_density(*middles, 7e-4 * narrower**2, 0.1 * narrower, 0.34)
+        off.append(float(density @ np.diff(found.u)) / found.elastic_energy - 1.0)
+    assert abs(off[2]) < 5e-3
+    assert abs(off[2]) < abs(off[1]) < abs(off[0])
