@@ -38,6 +38,14 @@ class Intrinsic:
         return self.belt.position, self.belt.frame[:, :, 1]
 
 
+class Thick(Intrinsic):
+    """The strip of finite thickness, whatever the energy of the others."""
+
+    def __init__(self, energy: Energy, elements: int) -> None:
+        del energy
+        super().__init__("shell", elements)
+
+
 class Ritz(Intrinsic):
     """The source's own method: 40 coefficients, whatever the mesh; it has no warm start here."""
 

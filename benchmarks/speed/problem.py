@@ -22,6 +22,8 @@ Energy: TypeAlias = EnergyModel
 EXAMPLES = ("example1", "example2")
 ENERGIES: tuple[Energy, ...] = get_args(EnergyModel)
 LENGTH, WIDTH = 1.0, 0.1
+SHEET = {"thickness": 7e-4, "poisson": 0.34}
+"""What only `shell` asks for: the source's sheet."""
 TOLERANCE = 1e-8
 WAVES = 3
 """Harmonics of the path."""
@@ -65,7 +67,7 @@ def scenario(energy: Energy, elements: int, pose: Pose) -> fb.Scenario:
     end = {"at": "end", "position": pose.position.tolist(), "rotation": pose.rotation.tolist()}
     return fb.Scenario(
         energy=energy,
-        belt={"width": WIDTH, "rigidity": 1.0, "segments": [{"kind": "straight", "length": LENGTH}]},
+        belt={"width": WIDTH, "rigidity": 1.0, "segments": [{"kind": "straight", "length": LENGTH}]} | SHEET,
         supports=[{"at": "start", "position": [0.0, 0.0, 0.0], "rotation": [0.0, 0.0, 0.0]}, end],
         solver={"elements": elements, "tolerance": TOLERANCE},
     )

@@ -36,6 +36,7 @@ class Entry:
 OURS = "fishbone"
 ENTRIES = (
     Entry(OURS, "ours", "Intrinsic", updates=10_000),
+    Entry("fishbone, finite thickness", "ours", "Thick", energies=("shell",), is_other_model=True, updates=10_000),
     Entry("CasADi + fatrop, compiled", "nlp", "fatrop_compiled", updates=1000),
     Entry("CasADi + IPOPT, compiled", "nlp", "ipopt_compiled", updates=500),
     Entry("CasADi + IPOPT, interpreted", "nlp", "ipopt_interpreted", updates=100),
