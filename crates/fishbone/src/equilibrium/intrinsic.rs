@@ -283,6 +283,11 @@ pub(super) fn judge<D: Density<F>, const F: usize, const N: usize>(
     let tolerance = problem.tolerance();
     let largest = solution.residuals.largest();
     let (iterations, violation) = (solution.iterations, solution.residuals.constraint);
+    // A search of a thick strip may fail where that of its thin limit does not.
+    let or_energy = match problem.is_of_shell() {
+        true => ", energy = \"wunderlich\"",
+        false => "",
+    };
     match outcome {
         Outcome::Converged if let Some(fault) = fault => (Status::NotConverged, fault),
         Outcome::Converged => (
@@ -312,14 +317,14 @@ pub(super) fn judge<D: Density<F>, const F: usize, const N: usize>(
             Status::NotConverged,
             format!(
                 "largest residual {largest:.1e} after {iterations} iterations, more than the tolerance {tolerance:.1e}; \
-                 try another solver.bulge or more solver.elements"
+                 try another solver.bulge{or_energy} or more solver.elements"
             ),
         ),
         Outcome::LocallyInfeasible => (
             Status::NotConverged,
             format!(
                 "no shape found that meets the supports, the nearest misses them by {violation:.1e} (lengths in U, \
-                 angles in rad); move the supports closer, try another solver.bulge or more solver.elements"
+                 angles in rad); move the supports closer, try another solver.bulge{or_energy} or more solver.elements"
             ),
         ),
         Outcome::Stalled if program.total_load() > HEAVY => (
@@ -339,7 +344,7 @@ pub(super) fn judge<D: Density<F>, const F: usize, const N: usize>(
                 Status::NotConverged,
                 format!(
                     "no step improves the shape any more, largest residual {largest:.1e} after {iterations} iterations; try \
-                     {advice} or another solver.elements"
+                     {advice}{or_energy} or another solver.elements"
                 ),
             )
         }

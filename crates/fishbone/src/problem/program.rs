@@ -162,20 +162,6 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         cut
     }
 
-    /// The programme of a belt that slides along itself with a square rib at the seam; `None` where it does not slide, or no
-    /// rib need be square. The slope of the ribs changes its sign from seam to seam after an odd number of half turns.
-    ///
-    /// The equations and their multipliers are the same: a shape that looks the same from both sides of the square rib, as
-    /// that of a Möbius band does, solves those of either programme.
-    pub(crate) fn with_square_seam(&self) -> Option<Self> {
-        let is_odd = self.slides()? % 2 != 0;
-        is_odd.then(|| {
-            let mut held = self.clone();
-            held.fixed[0][1] = Some(0.0);
-            held
-        })
-    }
-
     /// The programme of a belt as many times as wide, of the same rigidity.
     pub(crate) fn widened(mut self, factor: f64) -> Self {
         for piece in &mut self.pieces {

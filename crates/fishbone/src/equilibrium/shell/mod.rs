@@ -125,7 +125,7 @@ fn through_coarse(
         iterations: FEW,
         ..settings(problem, BARRIERS[1])
     };
-    let found = stagewise::minimise(&finer, &settings, point, proceed);
+    let found = minimise(&finer, &settings, point, proceed);
     let iterations = solution.iterations + found.iterations;
     (found.outcome == Outcome::Converged).then(|| (finer, found.after(iterations)))
 }
@@ -210,7 +210,7 @@ fn halved(
         iterations: FEW,
         ..settings(problem, BARRIERS[1])
     };
-    let found = stagewise::minimise(&finer, &settings, near.point.clone(), proceed);
+    let found = minimise(&finer, &settings, near.point.clone(), proceed);
     let is_found = found.outcome == Outcome::Converged && is_next(&found);
     is_found.then_some((finer, found))
 }
@@ -356,6 +356,30 @@ fn stability(
     Some(own.into())
 }
 
+/// The minimum that a search finds; of a band that may slide along itself the one with a square rib at its seam, unless only
+/// forces would hold it there.
+fn minimise(
+    program: &ShellProgram,
+    settings: &Settings,
+    start: BeltPoint<FIELDS>,
+    proceed: &mut Proceed,
+) -> ShellSolution {
+    let Some(held) = program.with_square_seam() else {
+        return stagewise::minimise(program, settings, start, proceed);
+    };
+    let found = stagewise::minimise(&held, settings, start, proceed);
+    if found.outcome == Outcome::Interrupted {
+        return found;
+    }
+    let own = assess(program, settings.tolerance, &found.at);
+    if own.outcome == Outcome::Converged {
+        return own.after(found.iterations);
+    }
+    let free = stagewise::minimise(program, settings, found.at.point, proceed);
+    let iterations = found.iterations + free.iterations;
+    free.after(iterations)
+}
+
 /// Settings of a search with a first barrier, in mean R_f/U.
 fn settings(problem: &Problem, barrier: f64) -> Settings {
     Settings {
@@ -409,7 +433,7 @@ fn from_shape(
         iterations: ITERATIONS,
         ..settings(problem, BARRIERS[0])
     };
-    let near = stagewise::minimise(&strong, &first, start(&strong, shape), proceed);
+    let near = minimise(&strong, &first, start(&strong, shape), proceed);
     if near.outcome != Outcome::Converged {
         return (strong, near);
     }
@@ -420,7 +444,7 @@ fn from_shape(
             iterations: ITERATIONS,
             ..settings(problem, *barrier)
         };
-        found = stagewise::minimise(&weak, &next, near.at.point.clone(), proceed);
+        found = minimise(&weak, &next, near.at.point.clone(), proceed);
         iterations += found.iterations;
         if matches!(found.outcome, Outcome::Converged | Outcome::Interrupted) {
             break;

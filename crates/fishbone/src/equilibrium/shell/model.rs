@@ -2,7 +2,7 @@
 
 use super::{
     BARRIERS, HALVINGS, POINTS, Proceed, ShellProgram, ShellSolution, change, drawn_in, halved,
-    hides_energy, judged, prolonged, settings, shared_out, solve,
+    hides_energy, judged, minimise, prolonged, settings, shared_out, solve,
 };
 use crate::equilibrium::model::{AnyStationary, StripModel};
 use crate::equilibrium::refinement::turns_too_far;
@@ -79,7 +79,7 @@ impl StripModel<FIELDS, 12> for Shell {
             return solve(problem, proceed);
         };
         let start = drawn_in(&program, shape.clone());
-        let found = stagewise::minimise(&program, &settings(problem, BARRIERS[1]), start, proceed);
+        let found = minimise(&program, &settings(problem, BARRIERS[1]), start, proceed);
         judged(problem, program, found)
     }
 
@@ -116,11 +116,11 @@ impl StripModel<FIELDS, 12> for Shell {
         strong.model = Self::new(Gauge::STRONG, POINTS);
         let downhill = Settings::downhill(problem.tolerance(), 1.0);
         let start = drawn_in(&strong, shape.clone());
-        let down = stagewise::minimise(&strong, &downhill, start, proceed);
+        let down = minimise(&strong, &downhill, start, proceed);
         if down.outcome != Outcome::Converged {
             return judged(problem, strong, down);
         }
-        let found = stagewise::minimise(
+        let found = minimise(
             &weak,
             &settings(problem, BARRIERS[1]),
             down.at.point,

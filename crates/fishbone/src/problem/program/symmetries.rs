@@ -5,7 +5,7 @@ use crate::geometry::{Pose, Twist, hat};
 use crate::strip::bounds::ACTIVE;
 use crate::strip::density::Density;
 use crate::strip::element::Element;
-use nalgebra::{DMatrix, DVector, RowDVector, SymmetricEigen, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, RowDVector, SVector, SymmetricEigen, Vector3, Vector6};
 use stagewise::NodeVector;
 
 /// A motion of all nodes.
@@ -41,8 +41,22 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
     /// The half turns of a belt that slides along itself in any pose; `None` of another belt.
     pub(crate) fn slides(&self) -> Option<i32> {
         let is_held = self.supports.len() > 1;
-        let slides = !is_held && self.is_uniform_and_closed() && self.seam_factor().is_some();
+        let slides = !is_held && self.is_uniform_and_closed() && self.seam_factors().is_some();
         self.half_turns.filter(|_| slides)
+    }
+
+    /// The programme of a belt that slides along itself with a square rib at the seam; `None` where it does not slide, or no
+    /// rib need be square. The slope of the ribs changes its sign from seam to seam after an odd number of half turns.
+    ///
+    /// The equations and their multipliers are the same: a shape that looks the same from both sides of the square rib, as
+    /// that of a Möbius band does, solves those of either programme.
+    pub(crate) fn with_square_seam(&self) -> Option<Self> {
+        let is_odd = self.slides()? % 2 != 0;
+        is_odd.then(|| {
+            let mut held = self.clone();
+            held.fixed[0][1] = Some(0.0);
+            held
+        })
     }
 
     /// Combinations of the six twists and of sliding that all conditions leave.
@@ -155,7 +169,7 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
     /// pose and the fields of the next. Two places that are held keep their distance to first order at most.
     fn sliding(&self, point: &BeltPoint<F>) -> Option<Motion<N>> {
         self.slides()?;
-        let sign = self.seam_factor()?;
+        let factors = self.seam_factors()?;
         let lengths: Vec<f64> = self.pieces.iter().map(Piece::length).collect();
         let last = lengths.len();
         let rate = |k: usize| {
@@ -173,7 +187,7 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         };
         let across = |mut rate: NodeVector<N>| {
             let mut fields = rate.fixed_rows_mut::<F>(6);
-            fields *= sign;
+            fields.component_mul_assign(&factors);
             rate
         };
         let ends = [lengths[last - 1], lengths[0]];
@@ -205,17 +219,20 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
             && self.loads.is_empty()
     }
 
-    /// The factor by which the fields go on through the seam; `None` where they need not, or where another link ties nodes.
-    fn seam_factor(&self) -> Option<f64> {
-        let mut factor = None;
+    /// The factors by which the fields go on through the seam; `None` where one need not, or where another link ties nodes.
+    fn seam_factors(&self) -> Option<SVector<f64, F>> {
+        let mut found = None;
         for link in &self.links {
             match link.tie {
                 Tie::Offset(_) => return None,
                 Tie::Pose(_) => (),
-                Tie::Fields([bend, slope, ..]) => factor = bend.filter(|_| bend == slope),
+                Tie::Fields(factors) => {
+                    let factors: Option<Vec<f64>> = factors[..F].iter().copied().collect();
+                    found = factors.map(|factors| SVector::from_column_slice(&factors));
+                }
             }
         }
-        factor
+        found
     }
 }
 
