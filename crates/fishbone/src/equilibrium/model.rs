@@ -7,6 +7,7 @@ use crate::problem::{Mesh, Problem};
 use crate::strip::density::Density;
 use crate::strip::developable::DevelopableEnergy;
 use crate::strip::shell::FIELDS;
+use nalgebra::SVector;
 use stagewise::{Distance, Solution, Stationary};
 use std::ops::ControlFlow;
 
@@ -92,6 +93,12 @@ pub(crate) trait StripModel<const F: usize, const N: usize>: Density<F> {
         program: &BeltProgram<Self, F, N>,
         at: &Stationary<BeltPoint<F>>,
     ) -> Option<Mesh>;
+
+    /// Whether fields at the nodes of a mesh are so near to others, of an equilibrium of the belt, that theirs is one, too:
+    /// never where it takes no time to see.
+    fn is_as_sound_as(_fields: &[SVector<f64, F>], _sound: &[SVector<f64, F>]) -> bool {
+        false
+    }
 
     /// Whether an equilibrium of a mesh is none of the belt: elements turn too far.
     fn is_of_mesh_alone(

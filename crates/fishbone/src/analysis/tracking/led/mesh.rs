@@ -18,9 +18,13 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
     ) -> Status {
         /// Change within an element over that of the last estimate from which the error is estimated again, dimensionless.
         const GROWN: f64 = 1.5;
-        let (program, point) = (self.follower.program(), self.point());
+        let (program, point) = (self.follower.program(), self.follower.point());
         let change = largest_change(program, point);
-        let is_far = D::is_of_mesh_alone(&self.problem, program, point);
+        let is_as_before = D::is_as_sound_as(&point.fields, &self.sound);
+        let is_far = !is_as_before && D::is_of_mesh_alone(&self.problem, program, point);
+        if !is_as_before && !is_far {
+            self.sound.clone_from(&point.fields);
+        }
         let has_changed = way.jump > 0.0 || change > GROWN * self.watched;
         let is_watched = !self.is_graded_anew && has_changed;
         if !is_far && !is_watched {

@@ -11,7 +11,7 @@ use crate::problem::program::{BeltPoint, BeltProgram};
 use crate::problem::{Mesh, Problem, Units};
 use crate::scenario::error::ScenarioError;
 use crate::scenario::{Scenario, SegmentSpec, SupportSpec};
-use nalgebra::Vector3;
+use nalgebra::{SVector, Vector3};
 use stagewise::{Distance, FollowSettings, Follower, Program, Solution};
 use std::ops::ControlFlow;
 use way::{Way, distance};
@@ -32,6 +32,8 @@ pub(super) struct Led<D: StripModel<F, N>, const F: usize, const N: usize> {
     is_graded_anew: bool,
     /// Largest change of turning within an element when the error of the mesh was estimated last, in rad.
     watched: f64,
+    /// Fields at the nodes when the shape was last seen to be an equilibrium of the belt, and not of its mesh alone.
+    sound: Vec<SVector<f64, F>>,
     /// Present pose of the support, in the units of the programme.
     pose: Pose,
     /// Pose of the support at which the board lies flat and at rest, in the units of the programme.
@@ -68,6 +70,7 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
             support,
             is_graded_anew: D::is_graded_anew(&problem),
             watched: largest_change(program, point),
+            sound: Vec::new(),
             pose: Pose {
                 frame,
                 position: (position - origin) / units.length,
