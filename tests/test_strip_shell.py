@@ -268,3 +268,33 @@ def test_the_narrow_limit_is_the_ribbon_of_audoly_and_neukirch(make: Callable[..
         off.append(float(density @ np.diff(found.u)) / found.elastic_energy - 1.0)
     assert abs(off[2]) < 5e-3
     assert abs(off[2]) < abs(off[1]) < abs(off[0])
+
+
+@pytest.mark.parametrize("half_turns", [0, 2])
+@pytest.mark.parametrize("width", [0.03, 0.2])
+@pytest.mark.parametrize("share", [0.002, 0.02])
+def test_a_ring_has_the_energy_of_a_cylinder_with_curled_edges(half_turns: int, width: float, share: float) -> None:
+    """Of two half turns it lies on itself, and is wound twice as tight."""
+    tables = board([straight(1.0)], [], closed=True, half_turns=half_turns, width=width)
+    ring = solve(thick(tables, share * width, 0.3))
+    bend = np.array(2.0 * np.pi * (1 if half_turns == 0 else 2))
+    density = ribbon_density(bend, np.array(0.0), share * width, width, 0.3)
+    assert ring.energy == pytest.approx(float(density), rel=2e-3 if half_turns else 1e-12)
+    assert ring.stable
+
+
+@pytest.mark.parametrize(("width", "share"), [(0.1, 0.0036), (0.12, 0.0065), (0.11, 0.018), (1.0 / 30.0, 0.002)])
+def test_moebius_bands_are_minima_on_every_mesh(width: float, share: float) -> None:
+    """Sliding along itself is a symmetry, which has no place on a mesh: with the six motions as a whole there are seven."""
+    tables = board([straight(1.0)], [], closed=True, half_turns=1, width=width)
+    bands = [solve(thick(with_elements(tables, count), share * width, 0.3)) for count in (None, 80, 160, 320)]
+    for band in bands:
+        assert band.stable
+        assert (band.negative_modes, band.zero_modes, band.half_turns) == (0, 7, 1)
+        assert band.energy == pytest.approx(bands[-1].energy, rel=3e-4)
+    assert bands[-1].energy < solve(tables).energy
+
+
+def with_elements(tables: Json, count: int | None) -> Json:
+    """The same belt on a uniform mesh, or on the default one."""
+    return tables if count is None else tables | {"solver": {"elements": count}}

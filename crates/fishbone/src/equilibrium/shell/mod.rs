@@ -73,11 +73,15 @@ pub(crate) fn next_to(problem: &Problem, found: Equilibrium, proceed: &mut Proce
         .expect("a division for every stretch");
     let mut iterations = found.iterations + solution.iterations;
     let mut error = OnceLock::new();
-    for _ in 0..HALVINGS {
+    for time in 0..HALVINGS {
         if problem.has_fixed_mesh() || solution.outcome != Outcome::Converged {
             break;
         }
         let finer = halved(problem, &program, &solution, proceed).or_else(|| {
+            // On finer meshes such a search takes long, and hardly finds what the one beside the solution does not.
+            if time > 0 {
+                return None;
+            }
             let mesh = Mesh::of(problem, &program).halved();
             let (program, solution) = from_start(&mesh, proceed)?;
             (solution.outcome == Outcome::Converged).then_some((program, solution))
