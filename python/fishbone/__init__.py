@@ -1,4 +1,4 @@
-"""Equilibrium shapes of thin, inextensible belts by the fishbone model.
+"""Equilibrium shapes of thin belts by the fishbone model.
 
 import fishbone as fb
 

@@ -88,7 +88,7 @@ class Commands(click.Group):
 @click.version_option(fishbone.__version__, prog_name="fishbone")
 @click.pass_context
 def command(context: click.Context) -> None:
-    """Equilibrium shapes of thin, inextensible belts."""
+    """Equilibrium shapes of thin belts."""
     if context.invoked_subcommand is None:
         click.echo(context.get_help())
 

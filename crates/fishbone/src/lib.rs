@@ -1,4 +1,4 @@
-//! Equilibrium shapes of thin, inextensible belts by the fishbone model.
+//! Equilibrium shapes of thin belts by the fishbone model.
 //!
 //! A belt is described by its centre line (the *spine*) and the straight lines across it (the *ribs*); its shape is the
 //! least bending energy under the poses of its supports. A [`scenario`] becomes a [`problem`], and a problem an
