@@ -30,9 +30,10 @@ type ShellSolution = Solution<BeltPoint<FIELDS>>;
 
 /// Points across the width, a number: where ribs come nearly as close as they may, the energy taken at 6 is off by up to 1 %.
 const POINTS: usize = 8;
-/// First barriers of the search with the strong gauge, then with the weak one, the last where the one before leads astray; in
-/// mean R_f/U.
-const BARRIERS: [f64; 3] = [1e-3, 1e-4, 1e-7];
+/// First barriers of a search with the strong gauge, the others where the one before leads astray; in mean R_f/U.
+const STRONG_BARRIERS: [f64; 3] = [1e-3, 1e-5, 1e-1];
+/// First barriers of a search with the weak gauge, likewise.
+const BARRIERS: [f64; 2] = [1e-4, 1e-7];
 /// Error over its change on halving all elements: energies converge with the length of elements, dimensionless.
 const OVER_CHANGE: f64 = 2.0;
 /// Displacement of nodes up to which a minimum on a finer mesh is the same, in U.
@@ -127,11 +128,10 @@ fn through_coarse(
     let point = drawn_in(&finer, prolonged(&program, &solution.at.point, &finer));
     let settings = Settings {
         iterations: FEW,
-        ..settings(problem, BARRIERS[1])
+        ..settings(problem, BARRIERS[0])
     };
     let found = minimise(&finer, &settings, point, proceed);
-    let iterations = solution.iterations + found.iterations;
-    (found.outcome == Outcome::Converged).then(|| (finer, found.after(iterations)))
+    (found.outcome == Outcome::Converged).then(|| (finer, found.after(solution.iterations)))
 }
 
 /// The equilibrium of a solution of a problem's programme, which has converged only if no energy hides from its mesh.
@@ -212,7 +212,7 @@ fn halved(
     }
     let settings = Settings {
         iterations: FEW,
-        ..settings(problem, BARRIERS[1])
+        ..settings(problem, BARRIERS[0])
     };
     let found = minimise(&finer, &settings, near.point.clone(), proceed);
     let is_found = found.outcome == Outcome::Converged && is_next(&found);
@@ -379,9 +379,7 @@ fn minimise(
     if own.outcome == Outcome::Converged {
         return own.after(found.iterations);
     }
-    let free = stagewise::minimise(program, settings, found.at.point, proceed);
-    let iterations = found.iterations + free.iterations;
-    free.after(iterations)
+    stagewise::minimise(program, settings, found.at.point, proceed).after(found.iterations)
 }
 
 /// Settings of a search with a first barrier, in mean R_f/U.
@@ -395,7 +393,7 @@ fn settings(problem: &Problem, barrier: f64) -> Settings {
 }
 
 /// The minimum of a strip of finite thickness next to the shape of a developable one, on its mesh. Where the shape leads to none,
-/// those of wider developable belts follow, whose ribs keep farther apart.
+/// or to one that hides energy, those of wider developable belts follow, whose ribs keep farther apart.
 fn from_developable(
     problem: &Problem,
     developable: &BeltProgram,
@@ -404,63 +402,94 @@ fn from_developable(
 ) -> (ShellProgram, ShellSolution) {
     /// Widths of the other developable belts, over the width.
     const WIDER: [f64; 2] = [1.25, 1.5];
-    let (mut program, mut solution) = from_shape(problem, developable, shape, proceed);
+    let strong = developable.as_shell(Shell::new(Gauge::STRONG, POINTS));
+    let mut found = from_shape(problem, &strong, smooth_from(&strong, shape), proceed);
+    let mut iterations = found.1.iterations;
     for wider in WIDER {
-        if matches!(solution.outcome, Outcome::Converged | Outcome::Interrupted) {
+        let (program, solution) = &found;
+        let is_sound = is_over(solution) && !may_hide_energy(problem, program, solution);
+        if is_sound || solution.outcome == Outcome::Interrupted {
             break;
         }
         let search = Search::of(problem);
         let wide = developable.clone().widened(wider);
         let barrier = search.settings.close_barrier;
         let apart = search.only_from(&wide, shape.clone(), barrier, proceed);
-        let iterations = solution.iterations + apart.iterations;
+        iterations += apart.iterations;
         if apart.outcome == Outcome::Converged {
-            (program, solution) = from_shape(problem, developable, &apart.at.point, proceed);
+            let start = smooth_from(&strong, &apart.at.point);
+            let other = from_shape(problem, &strong, start, proceed);
+            iterations += other.1.iterations;
+            if is_over(&other.1) || !is_over(solution) {
+                found = other;
+            }
         }
-        solution = solution.after(iterations);
     }
-    (program, solution)
+    found.1.iterations = iterations;
+    found
+}
+
+/// Whether energy hides from the mesh of a solution whose ribs come close to each other.
+fn may_hide_energy(problem: &Problem, program: &ShellProgram, solution: &ShellSolution) -> bool {
+    /// Least slack of ribs that are far apart, dimensionless.
+    const FAR: f64 = 0.2;
+    let point = &solution.at.point;
+    program.least_slack(point) < FAR && hides_energy(problem, program, point)
+}
+
+/// Whether a search needs no other.
+fn is_over(solution: &ShellSolution) -> bool {
+    matches!(solution.outcome, Outcome::Converged | Outcome::Interrupted)
 }
 
 /// The minimum of a strip of finite thickness that a search from one shape finds: with the strong gauge, then with the weak one.
 fn from_shape(
     problem: &Problem,
-    developable: &BeltProgram,
-    shape: &BeltPoint,
+    strong: &ShellProgram,
+    shape: BeltPoint<FIELDS>,
     proceed: &mut Proceed,
 ) -> (ShellProgram, ShellSolution) {
+    let near = minimum(problem, strong, &STRONG_BARRIERS, &shape, proceed);
+    if near.outcome != Outcome::Converged {
+        return (strong.clone(), near);
+    }
+    let mut weak = strong.clone();
+    weak.model = Shell::new(Gauge::WEAK, POINTS);
+    let found = minimum(problem, &weak, &BARRIERS, &near.at.point, proceed);
+    (weak, found.after(near.iterations))
+}
+
+/// The minimum of a programme that a search from a shape finds with one of several first barriers, tried in turn.
+fn minimum(
+    problem: &Problem,
+    program: &ShellProgram,
+    barriers: &[f64],
+    shape: &BeltPoint<FIELDS>,
+    proceed: &mut Proceed,
+) -> ShellSolution {
     /// Iterations that a search may take, a number: most take 10 to 60.
     const ITERATIONS: usize = 300;
-    let [strong, weak] =
-        [Gauge::STRONG, Gauge::WEAK].map(|gauge| developable.as_shell(Shell::new(gauge, POINTS)));
-    let first = Settings {
-        iterations: ITERATIONS,
-        ..settings(problem, BARRIERS[0])
-    };
-    let near = minimise(&strong, &first, start(&strong, shape), proceed);
-    if near.outcome != Outcome::Converged {
-        return (strong, near);
-    }
-    let mut iterations = near.iterations;
-    let mut found = near.clone();
-    for barrier in &BARRIERS[1..] {
-        let next = Settings {
+    let mut search = |barrier: f64| {
+        let settings = Settings {
             iterations: ITERATIONS,
-            ..settings(problem, *barrier)
+            ..settings(problem, barrier)
         };
-        found = minimise(&weak, &next, near.at.point.clone(), proceed);
-        iterations += found.iterations;
-        if matches!(found.outcome, Outcome::Converged | Outcome::Interrupted) {
+        minimise(program, &settings, shape.clone(), proceed)
+    };
+    let (first, others) = barriers.split_first().expect("at least one barrier");
+    let mut found = search(*first);
+    for barrier in others {
+        if is_over(&found) {
             break;
         }
+        found = search(*barrier).after(found.iterations);
     }
-    found.iterations = iterations;
-    (weak, found)
+    found
 }
 
 /// The fields of a developable shape with rib slopes so smooth that the ribs keep apart; the twist of the ribs keeps the
 /// torsion.
-fn start(program: &ShellProgram, shape: &BeltPoint) -> BeltPoint<FIELDS> {
+fn smooth_from(program: &ShellProgram, shape: &BeltPoint) -> BeltPoint<FIELDS> {
     /// Slack of the ribs at the start, dimensionless.
     const SLACK: f64 = 0.1;
     /// Times that slopes are drawn together at least, and at most, a number.

@@ -80,7 +80,7 @@ impl StripModel<FIELDS, 12> for Shell {
             return solve(problem, proceed);
         };
         let start = drawn_in(&program, shape.clone());
-        let found = minimise(&program, &settings(problem, BARRIERS[1]), start, proceed);
+        let found = minimise(&program, &settings(problem, BARRIERS[0]), start, proceed);
         judged(problem, program, found)
     }
 
@@ -123,7 +123,7 @@ impl StripModel<FIELDS, 12> for Shell {
         }
         let found = minimise(
             &weak,
-            &settings(problem, BARRIERS[1]),
+            &settings(problem, BARRIERS[0]),
             down.at.point,
             proceed,
         );
