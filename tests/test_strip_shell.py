@@ -285,7 +285,7 @@ def test_a_ring_has_the_energy_of_a_cylinder_with_curled_edges(half_turns: int, 
 
 @pytest.mark.parametrize(("width", "share"), [(0.1, 0.0036), (0.12, 0.0065), (0.11, 0.018), (1.0 / 30.0, 0.002)])
 def test_moebius_bands_are_minima_on_every_mesh(width: float, share: float) -> None:
-    """Sliding along itself is a symmetry, which has no place on a mesh: with the six motions as a whole there are seven."""
+    """Sliding along itself is a symmetry beside the six motions as a whole, though a mesh hardly has it."""
     tables = board([straight(1.0)], [], closed=True, half_turns=1, width=width)
     bands = [solve(thick(with_elements(tables, count), share * width, 0.3)) for count in (None, 80, 160, 320)]
     for band in bands:
