@@ -50,3 +50,19 @@ def test_thick_strips_have_less_energy_than_inextensible_ones(found: list[fb.Equ
         inextensible = fb.solve(fb.Scenario.from_dict(strip.scenario.to_dict() | {"energy": "wunderlich"}))
         if strip.status == inextensible.status == "converged":
             assert strip.energy < 1.001 * inextensible.energy
+
+
+@pytest.mark.parametrize("seed", [2306, 2758])
+def test_energy_that_hides_from_the_mesh_is_no_result(seed: int) -> None:
+    """Minima of their meshes alone: neither a solve nor a tracker that is led there takes one."""
+    tables = scenario_of(seed)
+    found = fb.solve(fb.Scenario.from_dict(tables))
+    assert found.status == "not_converged"
+    assert "the ribs turn so fast within elements" in found.message
+    end = tables["supports"][1]
+    before = {**end, "position": [0.9 * x for x in end["position"]]}
+    tracker = fb.Tracker(fb.Scenario.from_dict(tables | {"supports": [tables["supports"][0], before]}))
+    for share in np.linspace(0.9, 1.0, 11)[1:]:
+        update = tracker.update([share * x for x in end["position"]], end["rotation"])
+        assert tracker.equilibrium().status == "converged"
+    assert update.status == "not_converged"
