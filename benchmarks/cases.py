@@ -154,8 +154,13 @@ def distance_to_shell(name: str, energy: str) -> float:
 def _distance(belt: fb.Equilibrium, data: dict[str, Any]) -> float:
     # Nodes are repeated where fields may jump.
     nodes = np.flatnonzero(np.diff(belt.u, prepend=-1.0) > 0.0)
-    spine = curve(belt.u[nodes], belt.position[nodes], belt.frame[nodes, :, 1])
-    return float(np.sqrt(np.mean(np.sum((spine(data["u"]) - data["position"]) ** 2, axis=1))))
+    return off_shell(belt.u[nodes], belt.position[nodes], belt.frame[nodes, :, 1], data)
+
+
+def off_shell(u: Any, position: Any, tangent: Any, data: dict[str, Any]) -> float:
+    """RMS distance of a curve, given by positions and tangents, from a shell's centre line, over the points of that."""
+    line = curve(u, position, tangent)
+    return float(np.sqrt(np.mean(np.sum((line(data["u"]) - data["position"]) ** 2, axis=1))))
 
 
 def heavy(weight: float, *, edgewise: bool, push: float = 0.0, **belt: Any) -> dict[str, Any]:

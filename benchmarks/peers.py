@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import fishbone as fb
-from cases import clamped, curve, shell
+from cases import clamped, off_shell, shell
 from tables import VALIDATION, number, table, write
 from validation import processor
 
@@ -77,8 +77,7 @@ PEERS: dict[str, Callable[[str], Line]] = {
 def off(line: Line, data: dict[str, Any]) -> float:
     """RMS distance from the centre line of a shell, over its 101 points, in 1e-3 U."""
     u, position, tangent, _ = line
-    places = curve(u, position, tangent)(data["u"])
-    return 1e3 * float(np.sqrt(np.mean(np.sum((places - data["position"]) ** 2, axis=1))))
+    return 1e3 * off_shell(u, position, tangent, data)
 
 
 def rows() -> Iterator[list[str]]:

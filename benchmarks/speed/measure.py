@@ -18,7 +18,7 @@ from rich.progress import track
 
 import fishbone as fb
 import random_poses
-from cases import curve, shell
+from cases import off_shell, shell
 from speed.problem import ENERGIES, EXAMPLES, Answer, Pose, end_pose, path, scenario
 from speed.rivals import ENTRIES, OURS, Entry
 from speed.stopwatch import timed
@@ -114,8 +114,7 @@ def distance(rival: Rival, example: str) -> float:
     """RMS distance of the rival's last centre line from the shell's."""
     data = shell(example)
     position, tangent = rival.curve()
-    line = curve(np.linspace(0.0, data["length"], len(position)), position, tangent)
-    return float(np.sqrt(np.mean(np.sum((line(data["u"]) - data["position"]) ** 2, axis=1))))
+    return off_shell(np.linspace(0.0, data["length"], len(position)), position, tangent, data)
 
 
 # ----------------------------------------------------------------------------------------------------- random poses

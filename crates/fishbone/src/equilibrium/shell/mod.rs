@@ -250,7 +250,7 @@ fn split(problem: &Problem, program: &ShellProgram, parts: usize) -> Option<Shel
     Some(problem.program_on(&mesh)?.as_shell(program.model.clone()))
 }
 
-/// The same shape on a mesh that has all nodes of its own.
+/// The same shape on another mesh; exactly so on one that has all nodes of its own.
 fn prolonged(
     from: &ShellProgram,
     point: &BeltPoint<FIELDS>,
