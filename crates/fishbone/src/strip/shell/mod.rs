@@ -10,6 +10,7 @@
 
 pub(crate) mod across;
 pub(crate) mod edge_layer;
+mod gauge;
 mod kernel;
 mod section;
 mod share;
@@ -23,6 +24,8 @@ use super::ribs::Scaled;
 use crate::geometry::{Pose, Twist, gauss_points, magnus};
 use across::Across;
 use edge_layer::psi;
+use gauge::CLOSEST;
+pub(crate) use gauge::Gauge;
 use nalgebra::{SMatrix, SVector, Vector3};
 use num_dual::DualNum;
 use share::Share;
@@ -40,33 +43,6 @@ pub(crate) struct Shell {
     /// Rule of the integrals across the width.
     across: Across,
 }
-
-/// Weights of the term that chooses one of the rib slopes which describe nearly the same surface, dimensionless: at unit
-/// rigidity it is `(ε (y² + β²) + ε' (V y')² /(V √(E h/D))) / (2 V²)`, with the share `y = s V/2` of the convergence at which
-/// ribs meet.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Gauge {
-    /// Weight ε of the squares of slope and convergence.
-    pub(crate) slopes: f64,
-    /// Weight ε' of the square of the convergence's rate. Without it ribs of thick strips sway to and fro within the width.
-    pub(crate) sway: f64,
-}
-
-impl Gauge {
-    /// The gauge of a solve. It changes energies by less than 1e-3 of themselves.
-    pub(crate) const WEAK: Self = Self {
-        slopes: 3e-4,
-        sway: 0.1,
-    };
-    /// A gauge so strong that the energy has no minima with ribs that all but meet beside a clamp.
-    pub(crate) const STRONG: Self = Self {
-        slopes: 1e-2,
-        ..Self::WEAK
-    };
-}
-
-/// Largest share |s| V/2 of the convergence at which ribs meet at the edge, dimensionless.
-const CLOSEST: f64 = 0.9;
 
 impl Shell {
     /// The strip with a gauge and a number of points across the width, from 2 to 12.
@@ -332,12 +308,7 @@ impl Density<FIELDS> for Shell {
     fn value<T: DualNum<Primitive = f64> + Copy>(&self, section: &Section<'_, T, FIELDS>) -> T {
         let plate = Plate::of(section.element.geodesic, &section.stock);
         let rib = Rib::of(&section.fields, &section.rates, plate.geodesic);
-        let (a, y) = (plate.half_width, rib.convergence * plate.half_width);
-        let [_, convergence_rate, _] = rib.rates;
-        let slopes = (y * y + rib.slope * rib.slope) / (a * a) * self.gauge.slopes;
-        let sway = convergence_rate * convergence_rate * a / plate.stretching.sqrt();
-        let gauge = (slopes + sway * (2.0 * self.gauge.sway)) * 0.125;
-        rib.energy(&plate, &self.across) + gauge
+        rib.energy(&plate, &self.across) + self.gauge.energy(&plate, &rib)
     }
 
     /// The torsion is that of the ribs and their twist: ω_η = m − β ω_ζ.

@@ -15,6 +15,7 @@ mod point;
 use super::Gauge;
 use super::across::{Across, MODES, MOST};
 use super::edge_layer::psi_jet;
+use super::gauge::Term;
 use super::wide::Wide;
 use point::{Point, View};
 
@@ -177,7 +178,7 @@ impl Strain {
     }
 }
 
-/// The density of every lane at numbers x; infinite where ribs meet within the width.
+/// The density of every lane at numbers x; infinite where ribs come closer than they may.
 #[inline(always)]
 pub(super) fn density(x: &Row, plates: &Plates, rule: &Across, gauge: Gauge) -> Wide {
     let mut gauss = [Wide::ZERO; MOST];
@@ -198,14 +199,9 @@ pub(super) fn density(x: &Row, plates: &Plates, rule: &Across, gauge: Gauge) -> 
         work -= strain.y * modes[n] * modes[n - 1] * (2.0 * rule.beside[n]);
     }
     let layers = Layers::of(x, plates);
-    let [convergence, slope, rate] = gauge_factors(plates, gauge);
-    let gauge = convergence * x[CONVERGENCE].square()
-        + slope * x[SLOPE].square()
-        + rate * x[CONVERGENCE_RATE].square();
     sum += plates.stiffness() * work * 0.25;
     sum -= layers.moment * layers.moment * layers.share[0] * 0.5;
-    sum += gauge * 0.5;
-    Wide::where_below(strain.y * strain.y, 1.0, sum, Wide::all(f64::INFINITY))
+    sum + Term::of(gauge, plates, ribs(x)).value
 }
 
 /// The density of every lane at numbers x, with its derivatives by them; `CURVED` where a board of the block is curved in its
@@ -259,13 +255,21 @@ pub(super) fn differentiate<const CURVED: bool>(
     let twice = narrowing * plates.half_width * linear[2] * modes[0] * modes[0];
     into.add(CONVERGENCE, CONVERGENCE, -(twice * 0.5));
     Layers::of(x, plates).add(x, plates.poisson, into);
-    let [convergence, slope, rate] = gauge_factors(plates, gauge);
-    into.gradient[CONVERGENCE] += convergence * x[CONVERGENCE];
-    into.gradient[SLOPE] += slope * x[SLOPE];
-    into.gradient[CONVERGENCE_RATE] += rate * x[CONVERGENCE_RATE];
-    into.add(CONVERGENCE, CONVERGENCE, convergence);
-    into.add(SLOPE, SLOPE, slope);
-    into.add(CONVERGENCE_RATE, CONVERGENCE_RATE, rate);
+    let term = Term::of(gauge, plates, ribs(x));
+    for (place, [first, second]) in [
+        (CONVERGENCE, term.by_convergence),
+        (SLOPE, term.by_slope),
+        (CONVERGENCE_RATE, term.by_rate),
+    ] {
+        into.gradient[place] += first;
+        into.add(place, place, second);
+    }
+}
+
+/// Convergence, slope and the convergence's rate, on which the term of the gauge depends.
+#[inline(always)]
+fn ribs(x: &Row) -> [Wide; 3] {
+    [x[CONVERGENCE], x[SLOPE], x[CONVERGENCE_RATE]]
 }
 
 /// Adds the points' part of the derivatives but for the derivatives of b(t,t), whose factors are kept, and for the squares of
@@ -538,13 +542,4 @@ impl Layers {
         into.add(TWIST, SLOPE, -(held * 2.0));
         into.add(SLOPE, SLOPE, -(held * k * 2.0));
     }
-}
-
-/// Factors of the squares of s, β and s', doubled, in the term that chooses one of the rib slopes.
-#[inline(always)]
-fn gauge_factors(plates: &Plates, gauge: Gauge) -> [Wide; 3] {
-    let by_convergence = Wide::all(0.25 * gauge.slopes);
-    let by_slope = by_convergence * plates.half_width.square().recip();
-    let by_rate = plates.half_width * plates.stretching.sqrt().recip() * (0.5 * gauge.sway);
-    [by_convergence, by_slope, by_rate]
 }

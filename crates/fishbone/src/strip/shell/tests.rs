@@ -40,6 +40,7 @@ impl Reference {
 const NO_GAUGE: Gauge = Gauge {
     slopes: 0.0,
     sway: 0.0,
+    closeness: 0.0,
 };
 
 /// Reference values of an independent implementation by automatic differentiation. They include the term of the gauge of

@@ -147,6 +147,7 @@ fn runs(spine: &Spine) -> Vec<Vec<usize>> {
 struct Foot {
     u: f64,
     geodesic: f64,
+    half_width: f64,
     rib: Rib<f64>,
     /// Whether the other face and the other edge are meant, as beyond the seam of a belt of odd half turns.
     is_turned: bool,
@@ -189,6 +190,7 @@ fn feet(spine: &Spine, run: &[usize]) -> Option<Vec<Foot>> {
         Some(Foot {
             u: spine.u[element] + distance,
             geodesic: spine.pieces[element].geodesic(),
+            half_width: 0.5 * spine.width,
             rib: spine.rib(element, distance)?,
             is_turned: false,
         })
@@ -213,7 +215,8 @@ impl Foot {
     /// The point of the rib at a distance v from the spine: its arc length, and the curvature in the board's axes there.
     ///
     /// On an arc, v is measured along its radius, and the axes are those of the radius. A rib that runs on beyond the end of
-    /// an arc is placed as if the arc went on.
+    /// an arc is placed as if the arc went on. Beyond V/2, towards the inner edge of an arc, a slanted rib keeps the curvature
+    /// that it has there: the energy is taken no farther.
     fn at(&self, v: f64) -> (f64, BoardTensor) {
         if !self.is_turned {
             return self.on_own_side(v);
@@ -230,7 +233,8 @@ impl Foot {
     fn on_own_side(&self, v: f64) -> (f64, BoardTensor) {
         let (slope, geodesic) = (self.rib.slope, self.geodesic);
         let along = self.along(v);
-        let tensor = BoardTensor::on_rib(&self.rib.curvature(geodesic, along), slope);
+        let within = along.clamp(-self.half_width, self.half_width);
+        let tensor = BoardTensor::on_rib(&self.rib.curvature(geodesic, within), slope);
         if geodesic == 0.0 {
             return (self.u - slope * along, tensor);
         }

@@ -236,12 +236,17 @@ fn test_within_an_element_bend_and_twist_are_linear_and_slope_and_bend_across_ar
 }
 
 #[test]
-fn test_the_term_of_the_gauge_is_its_weights_times_the_squares_of_slope_convergence_and_sway() {
+fn test_the_term_of_the_gauge_is_its_weights_times_slope_excess_sway_and_closeness() {
     for geodesic in BOARDS {
         let element = element(geodesic);
         let ends = [NODES[0], NODES[0].map(|field| 1.01 * field)];
-        let energy = |slopes: f64, sway: f64| {
-            let shell = Shell::new(Gauge { slopes, sway }, 6);
+        let energy = |[slopes, sway, closeness]: [f64; 3]| {
+            let gauge = Gauge {
+                slopes,
+                sway,
+                closeness,
+            };
+            let shell = Shell::new(gauge, 6);
             shell.value(&shell.section(&element, ends, 0.3))
         };
         let share = |t: f64| {
@@ -251,18 +256,19 @@ fn test_the_term_of_the_gauge_is_its_weights_times_the_squares_of_slope_converge
         let slope = shell().section(&element, ends, 0.3).fields[1];
         let step = 1e-4;
         let rate = (share(0.3 + step) - share(0.3 - step)) / (2.0 * step * element.length);
-        // ½ (D/V) (ε (y² + β²) + ε' (V y')² h̃/V) at D V = 1 and V = 0.1, with h̃ = √(D/(E h)).
-        let by_slopes = 0.5 * 100.0 * (share(0.3).powi(2) + slope * slope);
-        let by_sway = 0.5 * 100.0 * (0.1 * rate).powi(2) / (0.1 * element.stretching.sqrt());
-        assert_relative_eq!(
-            energy(1e-2, 0.0) - energy(0.0, 0.0),
-            1e-2 * by_slopes,
-            max_relative = 1e-9
-        );
-        assert_relative_eq!(
-            energy(0.0, 0.3) - energy(0.0, 0.0),
-            0.3 * by_sway,
-            max_relative = 1e-6
-        );
+        // ½ (D/V) (ε (w² + β²) + (ε' (V y')² + ε″ w² y²/(0.9² − y²)) h̃/V) with w = y − κ_g V/2, at D V = 1 and V = 0.1, with h̃ = √(D/(E h)).
+        let y = share(0.3);
+        let excess = y - 0.05 * geodesic;
+        let thickness = 1.0 / (0.1 * element.stretching.sqrt());
+        let by_slopes = 50.0 * (excess * excess + slope * slope);
+        let by_sway = 50.0 * (0.1 * rate).powi(2) * thickness;
+        let by_closeness = 50.0 * (excess * y).powi(2) / (0.81 - y * y) * thickness;
+        let bare = energy([0.0; 3]);
+        let close = |weights: [f64; 3], expected: f64| {
+            assert_relative_eq!(energy(weights) - bare, expected, max_relative = 1e-6);
+        };
+        close([1e-2, 0.0, 0.0], 1e-2 * by_slopes);
+        close([0.0, 0.3, 0.0], 0.3 * by_sway);
+        close([0.0, 0.0, 2.0], 2.0 * by_closeness);
     }
 }
