@@ -1,7 +1,9 @@
 //! Fundamental forms and curvatures.
 
 use super::rib_angle;
+use super::thick::BoardTensor;
 use crate::strip::element::torsion;
+use crate::strip::shell::Curvature;
 use crate::strip::spine::Spine;
 use nalgebra::{Matrix3, Vector3};
 
@@ -186,14 +188,27 @@ impl Spine {
         self.rib_slope.iter().copied().map(rib_angle).collect()
     }
 
-    /// The non-zero principal curvature κ₁ = −ω_ζ (1 + β²) at every node.
+    /// The principal curvature κ₁ of larger magnitude on the spine at every node. Where ribs are straight it is −ω_ζ (1 + β²), and
+    /// the other one is 0.
     ///
     /// Source: Eq. (29)
     pub fn curvature(&self) -> Vec<f64> {
-        let fields = self.bend.iter().zip(&self.rib_slope);
-        fields
-            .map(|(&bend, &slope)| curvature(bend, slope))
-            .collect()
+        let nodes = 0..self.bend.len();
+        nodes.map(|node| self.curvature_at(node)).collect()
+    }
+
+    fn curvature_at(&self, node: usize) -> f64 {
+        let (bend, slope) = (self.bend[node], self.rib_slope[node]);
+        let Some(curved) = &self.curved else {
+            return curvature(bend, slope);
+        };
+        let rib = Curvature {
+            along: -bend,
+            mixed: curved.twist[node],
+            across: curved.across[node],
+            area: 1.0,
+        };
+        BoardTensor::on_rib(&rib, slope).principal()
     }
 }
 

@@ -25,10 +25,15 @@ impl BoardTensor {
         }
     }
 
+    /// The principal value of larger magnitude.
+    pub(in crate::surface) fn principal(&self) -> f64 {
+        let mean = 0.5 * (self.uu + self.vv);
+        mean + self.uv.hypot(0.5 * (self.uu - self.vv)).copysign(mean)
+    }
+
     /// Magnitude of the principal value of larger magnitude.
     pub(in crate::surface) fn largest(&self) -> f64 {
-        let mean = 0.5 * (self.uu + self.vv);
-        mean.abs() + self.uv.hypot(0.5 * (self.uu - self.vv))
+        self.principal().abs()
     }
 
     /// The product of both principal values.
