@@ -283,10 +283,17 @@ pub(super) fn judge<D: Density<F>, const F: usize, const N: usize>(
     let tolerance = problem.tolerance();
     let largest = solution.residuals.largest();
     let (iterations, violation) = (solution.iterations, solution.residuals.constraint);
+    /// Thickness below which a sheet is all but one of no thickness, in V.
+    const THIN: f64 = 5e-4;
     // A search of a thick strip may fail where that of its thin limit does not.
-    let or_energy = match problem.is_of_shell() {
-        true => ", energy = \"wunderlich\"",
-        false => "",
+    let belt = &problem.scenario().belt;
+    let is_thin = belt
+        .thickness_value()
+        .is_some_and(|h| h < THIN * belt.width);
+    let or_energy = match (problem.is_of_shell(), is_thin) {
+        (true, true) => ", energy = \"wunderlich\", the limit of sheets thinner than V/2000,",
+        (true, false) => ", energy = \"wunderlich\"",
+        (false, _) => "",
     };
     match outcome {
         Outcome::Converged if let Some(fault) = fault => (Status::NotConverged, fault),

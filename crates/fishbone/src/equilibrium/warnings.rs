@@ -15,18 +15,18 @@ impl Equilibrium {
     pub(crate) fn warnings_with(&self, crossing: Option<[f64; 2]>) -> Vec<String> {
         let crossing = crossing.filter(|_| self.status == Status::Converged);
         let scales = implausible_scales(&self.scenario().belt);
-        let solve = self.warnings.iter().cloned().chain(self.inaccurate());
+        let fixed = self.problem.has_fixed_mesh();
+        let coarse = self.too_coarse_for_width().filter(|_| fixed);
+        let mesh = coarse.into_iter().chain(self.inaccurate());
+        let solve = self.warnings.iter().cloned().chain(mesh);
         solve.chain(scales).chain(crossing.map(crossed)).collect()
     }
 }
 
 impl Equilibrium {
-    /// The warning of a mesh that is too coarse: for the width where the scenario fixes it, else for the accuracy.
+    /// The warning of a mesh that is too coarse for the accuracy.
     fn inaccurate(&self) -> Option<String> {
         let (accuracy, fixed) = (self.problem.accuracy(), self.problem.has_fixed_mesh());
-        if let Some(warning) = self.too_coarse_for_width().filter(|_| fixed) {
-            return Some(warning);
-        }
         self.certified_any().ok()?;
         let Some(error) = self.error() else {
             return Some(
@@ -50,6 +50,7 @@ impl Equilibrium {
         })
     }
 
+    /// The warning of elements that are too long for the width.
     fn too_coarse_for_width(&self) -> Option<String> {
         /// Elements for each width V that are safe, a number: strong twist makes facets of the scale of V, which longer
         /// elements cannot resolve.

@@ -5,6 +5,7 @@
 //! smoothed, finds the minimum with the strong gauge, and follows it to the weak one.
 
 mod model;
+mod saddle;
 
 use super::accuracy::{MeshError, Quantities};
 use super::intrinsic;
@@ -72,6 +73,9 @@ pub(crate) fn next_to(problem: &Problem, found: Equilibrium, proceed: &mut Proce
     let (mut program, mut solution) = through_coarse(problem, &mesh, from_start, proceed)
         .or_else(|| from_start(&mesh, proceed))
         .expect("a division for every stretch");
+    if let Some(fallen) = saddle::fallen(problem, &program, &solution, proceed) {
+        solution = fallen;
+    }
     let mut iterations = found.iterations + solution.iterations;
     let mut error = OnceLock::new();
     for time in 0..HALVINGS {
@@ -139,7 +143,7 @@ fn judged(problem: &Problem, program: ShellProgram, solution: ShellSolution) -> 
     // Which constraints follow from others does not depend on the energy.
     let redundant = intrinsic::redundant(problem, &problem.program(problem.elements()));
     let is_hiding = hides_energy(problem, &program, &solution.at.point);
-    let fault = is_hiding.then(|| HIDDEN.to_owned());
+    let fault = is_hiding.then(|| hidden(problem));
     let (status, message) =
         intrinsic::judge(problem, &program, &solution, fault, redundant.as_deref());
     let judged = Judged {
@@ -157,8 +161,16 @@ fn judged(problem: &Problem, program: ShellProgram, solution: ShellSolution) -> 
 }
 
 /// Message of a mesh too coarse for its own energy, for people.
-const HIDDEN: &str = "the ribs turn so fast within elements that the energy taken at their points is not that of the shape: give \
-                      more solver.elements, or leave them out";
+fn hidden(problem: &Problem) -> String {
+    let other = match problem.has_fixed_mesh() {
+        true => "leave them out",
+        false => "name energy = \"wunderlich\"",
+    };
+    format!(
+        "the ribs turn so fast within elements that the energy taken at their points is not that of the shape: give more \
+         solver.elements, or {other}"
+    )
+}
 
 /// The estimated error of a solution by its mesh: its change on halving all elements.
 pub(super) fn error(problem: &Problem, solved: &Solved<Shell, FIELDS, 12>) -> Option<MeshError> {
