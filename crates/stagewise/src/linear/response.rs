@@ -14,8 +14,8 @@ use nalgebra::SMatrix;
 const REFINEMENTS: usize = 20;
 /// Ratio of refinement to solution at which refinement has converged; dimensionless.
 const CONVERGED: f64 = 1e-16;
-/// Ratio of solution to right-hand side below which the solution is rounding; dimensionless.
-const NEGLIGIBLE: f64 = 1e-8;
+/// Ratio of solution to right-hand side below which the solution is rounding, as where forces alone change; dimensionless.
+const NEGLIGIBLE: f64 = 1e-5;
 /// Ratio of residual to solution above which the system is singular; dimensionless.
 const SIGNIFICANT: f64 = 1e-6;
 
