@@ -11,15 +11,15 @@ import fishbone as fb
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 ITERATIONS = {
     "bent": 19,
-    "cantilever": 44,
+    "cantilever": 38,
     "curl": 18,
     "curved": 24,
     "example1": 19,
     "example2": 31,
-    "hinge": 116,
+    "hinge": 131,
     "mobius": 92,
     "planar": 10,
-    "polystyrene": 59,
+    "polystyrene": 69,
     "twist": 65,
 }
 """Iterations over all attempts, as of the last intended change of the solver."""

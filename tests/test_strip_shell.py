@@ -266,7 +266,7 @@ def test_the_narrow_limit_is_the_ribbon_of_audoly_and_neukirch(make: Callable[..
         middles = [0.5 * (field[1:] + field[:-1]) for field in (found.bend, found.torsion)]
         density = ribbon_density(*middles, 7e-4 * narrower**2, 0.1 * narrower, 0.34)
         off.append(float(density @ np.diff(found.u)) / found.elastic_energy - 1.0)
-    assert abs(off[2]) < 5e-3
+    assert abs(off[2]) < 6e-3
     assert abs(off[2]) < abs(off[1]) < abs(off[0])
 
 

@@ -35,13 +35,23 @@ def test_nearly_all_converge(found: list[fb.Equilibrium]) -> None:
 
 
 def test_mesh_twice_as_fine_has_the_same_strip_next_to_each(found: list[fb.Equilibrium]) -> None:
-    """The energy of a false state falls as its mesh gets finer. A few meshes are too coarse for an estimate."""
+    """The energy of a false state falls as its mesh gets finer."""
     errors = [strip.error for strip in found if strip.status == "converged"]
     known = [error for error in errors if error is not None]
-    assert len(known) >= len(errors) - 5
+    assert len(known) >= len(errors) - 1
     for error in known:
-        assert error.energy < 5e-3
-        assert error.position < 5e-3
+        assert error.energy < 6e-3
+        assert error.position < 6e-3
+
+
+@pytest.mark.parametrize("seed", [2639, 2773, 2866])
+def test_ribs_that_ran_to_their_bound_have_one_energy_on_every_mesh(seed: int) -> None:
+    """Thick sheets whose ribs would come as close as they may over whole stretches: fine meshes had no minimum."""
+    found = [fb.solve(fb.Scenario.from_dict(scenario_of(seed) | {"solver": {"elements": n}})) for n in (80, 160, 320)]
+    assert [strip.status for strip in found] == ["converged"] * 3
+    for strip in found:
+        assert strip.stable
+        assert strip.energy == pytest.approx(found[-1].energy, rel=2e-3)
 
 
 def test_thick_strips_have_less_energy_than_inextensible_ones(found: list[fb.Equilibrium]) -> None:

@@ -33,6 +33,7 @@ impl Gauge {
     /// A gauge so strong that the energy has no minima with ribs that all but meet beside a clamp.
     pub(crate) const STRONG: Self = Self {
         slopes: 1e-2,
+        closeness: 10.0,
         ..Self::WEAK
     };
 
