@@ -33,7 +33,8 @@ def branches(scenario: Scenario, *, progress: Callable[[int, int], object] | Non
     are unconfirmed on refinement, by a mesh twice as fine, are left out; of equilibria that the mesh does not resolve
     the lowest is kept. Of two mirror images the list has the one on the side of the scenario's `bulge`. A belt may
     pass through itself during the search: check `Equilibrium.crosses_itself`. The same scenario has the same list.
-    Where no equilibrium is found the list has the failed result of `solve`, with its message.
+    With the energy "shell" the list has the minima next to those of "wunderlich" alone, and no saddles. Where no
+    equilibrium is found the list has the failed result of `solve`, with its message.
 
     `progress(done, planned)` is called from the calling thread during the search; both are numbers of tasks. All cores
     are used, other threads run meanwhile, and Ctrl-C ends the search.

@@ -108,8 +108,13 @@ def command(context: click.Context) -> None:
     callback=_output(".stl", ".ply", ".obj", ".glb"),
     help="Write the surface: .stl, .ply, .obj or .glb.",
 )
-@click.option("--energy", type=click.Choice(get_args(EnergyModel)), help="The bending energy, in place of the file's.")
-@click.option("--all", "is_all", is_flag=True, help="Search for all equilibria, saddles included, not for one minimum.")
+@click.option("--energy", type=click.Choice(get_args(EnergyModel)), help="The elastic energy, in place of the file's.")
+@click.option(
+    "--all",
+    "is_all",
+    is_flag=True,
+    help="Search for all equilibria, saddles included, not for one minimum; with the energy shell for minima alone.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON instead of a table.")
 def solve(  # noqa: PLR0913 - one for each option
     file: Path,
@@ -124,7 +129,8 @@ def solve(  # noqa: PLR0913 - one for each option
     """Solve a scenario.
 
     FILE is .toml or .json; the result is printed as a table. With --all the table has a row for each equilibrium, the
-    result is a list of equilibria, and the figure shows them side by side.
+    result is a list of equilibria, and the figure shows them side by side. With the energy shell these are the minima
+    next to those of wunderlich, without saddles.
 
     Exit code: 0 converged, 2 invalid input, 3 infeasible or not converged.
     """

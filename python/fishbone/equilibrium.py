@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 MIN_ACROSS, MAX_ACROSS = 2, 10_001
-"""Points on a rib. Ribs are straight: two points determine a rib, further points are for rendering."""
+"""Points on a rib. Two points determine a straight rib; ribs of the energy "shell" bend a little."""
 
 MAX_MODES = 100
 """Number of modes, more than a mesh resolves."""
@@ -269,7 +269,7 @@ class Equilibrium:
 
     @property
     def elastic_energy(self) -> float:
-        """Energy of bending alone."""
+        """Energy of bending, with the energy "shell" of bending and stretching: the potential without that of loads."""
         return self._inner.elastic_energy
 
     @property
@@ -386,7 +386,7 @@ class Equilibrium:
 
     @property
     def torsion(self) -> Floats:
-        """Torsion ω_η.
+        """Torsion ω_η: −β ω_ζ, with the energy "shell" m − β ω_ζ, where m is the twist of the rib.
 
         Shapes: (n,).
         Source: Eq. (4).
@@ -413,7 +413,9 @@ class Equilibrium:
 
     @property
     def curvature(self) -> Floats:
-        """Principal curvature κ₁, across the rib; the other principal curvature is zero.
+        """Principal curvature κ₁ of greatest magnitude of the surface at the spine.
+
+        Of the developable energies it is −ω_ζ (1 + β²), across the rib, and the other principal curvature is zero.
 
         Shapes: (n,).
         Source: Eq. (29).
@@ -450,8 +452,8 @@ class Equilibrium:
     def least_bend_radius(self) -> BendRadius | None:
         """The least bend radius of the whole belt, often at an edge; None where nothing bends.
 
-        The radius of developable belts falls with every refinement of the mesh, because ribs all but meet on an edge
-        where the bend changes sign. `bend_radius` converges.
+        The radius of developable belts is a property of the mesh, because ribs all but meet on an edge where the bend
+        changes sign. `bend_radius` converges.
 
         With `energy = "shell"` it converges. It is the least at least V/5 away from clamps: from both ends (of a closed
         belt, from its seam), stiffeners, corners, and places where the bend may jump, as at supports that hold a

@@ -341,7 +341,7 @@ class Diagram:
         The columns are branch, state, parameter, energy, height, stable, negative_modes, event (its kind, or empty),
         supports[0].force.x … supports[k].moment.z, least_spine_radius, bend_radius.p999, bend_radius.p99,
         bend_radius.p95 (exceeded on 99.9, 99 and 95 % of the area), least_bend_radius (over the width; of developable
-        belts it falls with the mesh), rib_margin, status, residual, error (the largest by the mesh), confirmed (of the
+        belts a property of the mesh), rib_margin, status, residual, error (the largest by the mesh), confirmed (of the
         event; True without one), jump, released, and angle along poses that have one. Where nothing bends the radii on
         the spine and over the width are NaN.
 

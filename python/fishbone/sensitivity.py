@@ -90,9 +90,15 @@ class Sensitivity:
 
         `supports` holds [translation, left world-axes rotation about the support point] of every support; components
         that are free change nothing. `rigidity` is the change of R_f at the nodes, linear in between. `width` changes
-        the width alone, `thickness` and `poisson` each its own number alone. For a belt given by its material the
-        rigidity and the mass change with the width: add `rigidity = R_f/V` and `gravity = g/V` for `width = 1`. They
-        change with the thickness h, too: add `rigidity = 3 R_f/h` and `gravity = g/h` for `thickness = 1`.
+        the width alone, `thickness` and `poisson` each its own number alone, at constant rigidity and mass. The
+        thickness of `layers` is that of the sheet whose stretching stiffness is to its bending stiffness as theirs.
+
+        The rigidity R_f = E h³ V/(12 (1 − ν²)) and the mass of a sheet given by its `material` change with its width V
+        and its thickness h, the rigidity with Poisson's ratio ν, too. Add these changes, with `ones = np.ones(n)`:
+
+        - for `width = 1`: `rigidity = R_f/V * ones`, `gravity = g/V`;
+        - for `thickness = 1`: `rigidity = 3 * R_f/h * ones`, `gravity = g/h`;
+        - for `poisson = 1`: `rigidity = 2 * ν * R_f/(1 − ν²) * ones`.
 
         Shapes: supports (m, 6), rigidity (n,), natural_bend (segments,), gravity (3,); None is no change.
         Errors: `InvalidArgument` for other shapes and for numbers that are not finite; `NoSensitivity` where the
