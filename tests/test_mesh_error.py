@@ -365,3 +365,16 @@ def test_estimate_holds_where_one_newton_step_does_not(name: str) -> None:
     radii = [of.to_dict()["least_spine_radius"]["value"] for of in (found, fine)]
     assert force <= found.error.force / 0.3
     assert abs(radii[0] / radii[1] - 1.0) <= found.error.radius / 0.3
+
+
+def test_refinement_ends_where_every_mesh_has_a_minimum_of_its_own() -> None:
+    lengths = [0.3386, 0.3926, 0.3429]
+    first, second, third = ({"kind": "straight", "length": length} for length in lengths)
+    corner = {"kind": "corner", "angle": -1.0891}
+    belt = {"segments": [first | {"rigidity": 2.1478}, corner, second, third | {"rigidity": 0.9547}], "poisson": 0.4568}
+    pose = clamps([0.05324, 0.34304, -0.41177], [-1.37667, 0.32508, -0.07241])
+    found = fb.solve(fb.Scenario.from_dict(scenario(pose, width=0.05, belt=belt)), strict=True)
+    assert found.error is not None
+    assert max(found.error) <= 1e-3
+    # One search of the three leads from mesh to mesh, to 15 000 elements if it is let.
+    assert found.iterations < 5000

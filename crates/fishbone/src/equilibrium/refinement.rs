@@ -512,7 +512,7 @@ impl Level {
     }
 
     /// Whether the mesh is much finer than another level's, and yet the error no smaller: as where a density that does not
-    /// know the width folds the belt into facets, finer ones on a finer mesh.
+    /// know the width folds the belt into facets, finer ones on a finer mesh, or where every mesh has a minimum of its own.
     fn is_in_vain_after(&self, other: &Self) -> bool {
         /// Number of elements up to which further ones may still pay.
         const FEW: f64 = 1000.0;
@@ -523,7 +523,7 @@ impl Level {
         let elements = |level: &Self| level.program.elements().count() as f64;
         let is_finer = elements(self) >= FEW.max(FINER * elements(other));
         let [own, others] = [self, other].map(Self::largest_error);
-        is_finer && others <= LARGE && own > SAME * others
+        is_finer && own >= SAME * others
     }
 
     /// The largest estimated error; infinite where none is known.
