@@ -483,6 +483,15 @@ def test_all_shows_its_progress_once_it_takes_long(run, monkeypatch, planar_file
     assert "50%" in err
 
 
+def test_the_share_of_the_same_work_never_falls():
+    state = progress.Progress("searching")
+    shares = []
+    for words, share in [("searching", 0.5), ("searching", 0.3), ("searching", 0.7), ("reporting", 0.1)]:
+        state.show(words, share)
+        shares.append(state.share)
+    assert shares == [0.5, 0.5, 0.7, 0.1]
+
+
 def test_a_solve_shows_that_it_goes_on(run, monkeypatch, planar_file):
     """Without any word from the core, as of a mesh of 100 000 elements."""
     solve = fb.solve

@@ -33,7 +33,9 @@ class Progress:
         """The share done, between 0 and 1; None where it is not known."""
 
     def show(self, words: str, share: float | None = None) -> None:
-        """Sets words and share."""
+        """Sets words and share. The share of the same work never falls, also where more of it turns up."""
+        if share is not None and self.share is not None and words == self.words:
+            share = max(share, self.share)
         self.words, self.share = words, share
 
 
