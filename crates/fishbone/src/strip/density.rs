@@ -123,13 +123,13 @@ pub trait Density<const F: usize>: Clone {
         fields + step
     }
 
-    /// Adds the second derivative of [`Self::moved`] along a gradient by the fields.
-    fn add_curvature_of_steps(
+    /// Second derivative of [`Self::moved`] along a gradient by the fields; `None` where a step is added.
+    fn curvature_of_steps(
         &self,
         _fields: &SVector<f64, F>,
-        _gradient: &SVector<f64, F>,
-        _into: &mut SMatrix<f64, F, F>,
-    ) {
+        _gradient: impl FnOnce() -> SVector<f64, F>,
+    ) -> Option<SMatrix<f64, F, F>> {
+        None
     }
 
     /// Number of inequalities of an element.

@@ -244,15 +244,20 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
             if self.is_tied(node) {
                 continue;
             }
-            let mut gradient = by_fields(node, bounds, into);
-            if let Some(tie) = into.chain.stages.get(node).and_then(|stage| stage.tie) {
-                gradient += tie.tr_mul(&by_fields(node + 1, bounds, into));
-            }
-            let own = match node == last {
-                true => &mut into.diagonal.controls[node - 1].second,
-                false => &mut into.diagonal.controls[node].first,
+            let gradient = || {
+                let own = by_fields(node, bounds, into);
+                match into.chain.stages.get(node).and_then(|stage| stage.tie) {
+                    Some(tie) => own + tie.tr_mul(&by_fields(node + 1, bounds, into)),
+                    None => own,
+                }
             };
-            self.model.add_curvature_of_steps(fields, &gradient, own);
+            if let Some(second) = self.model.curvature_of_steps(fields, gradient) {
+                let own = match node == last {
+                    true => &mut into.diagonal.controls[node - 1].second,
+                    false => &mut into.diagonal.controls[node].first,
+                };
+                *own += second;
+            }
         }
     }
 

@@ -386,12 +386,13 @@ impl Density<FIELDS> for Shell {
         moved
     }
 
-    fn add_curvature_of_steps(
+    fn curvature_of_steps(
         &self,
         fields: &SVector<f64, FIELDS>,
-        gradient: &SVector<f64, FIELDS>,
-        into: &mut SMatrix<f64, FIELDS, FIELDS>,
-    ) {
+        gradient: impl FnOnce() -> SVector<f64, FIELDS>,
+    ) -> Option<SMatrix<f64, FIELDS, FIELDS>> {
+        let gradient = gradient();
+        let mut into = SMatrix::zeros();
         let mut add = |i: usize, j: usize, value: f64| {
             into[(i, j)] += value;
             into[(j, i)] += value;
@@ -400,6 +401,7 @@ impl Density<FIELDS> for Shell {
         add(1, 1, fields[0] * gradient[4]);
         add(1, 3, -2.0 * gradient[4]);
         add(2, 3, -2.0 * gradient[5]);
+        Some(into)
     }
 
     fn inequalities(&self, _: &Element, _: &[Option<Edge>; ACTIVE]) -> usize {
