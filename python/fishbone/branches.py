@@ -39,7 +39,8 @@ def branches(scenario: Scenario, *, progress: Callable[[int, int], object] | Non
     `progress(done, planned)` is called from the calling thread during the search; both are numbers of tasks. All cores
     are used, other threads run meanwhile, and Ctrl-C ends the search.
 
-    Errors: `InvalidArgument` where `scenario` is no scenario; any error that `progress` raises.
+    Errors: `InvalidArgument` where `scenario` is no scenario; `RuntimeError` where the system gives no more threads;
+    any error that `progress` raises.
     """
     return _search(scenario, None, progress)
 

@@ -744,7 +744,8 @@ def solve_many(
     solves. Other threads run meanwhile, and Ctrl-C ends the solves. The environment variable RAYON_NUM_THREADS limits
     the number of threads.
 
-    Errors: `InvalidArgument` where one of `scenarios` is no scenario; any error that `progress` raises.
+    Errors: `InvalidArgument` where one of `scenarios` is no scenario; `RuntimeError` where the system gives no more
+    threads; any error that `progress` raises.
     """
     scenarios = list(scenarios)
     found = _core.solve_many([core_of(scenario) for scenario in scenarios], progress)

@@ -47,6 +47,9 @@ class Tracker:
     `fb.Tracker(scenario)` solves the scenario first. `support` is named as for `Equilibrium.reaction`, and must hold a
     position and a rotation. All properties are those after the last update that converged.
 
+    Threads and handlers of signals may read the properties during an update: they get those before it. Of the methods
+    one runs at a time: another thread waits, and a handler that interrupts one gets a `RuntimeError` from the others.
+
     Errors: `NoTracker` where the solve finds no minimum, or where the support cannot be moved; `NoSupport`.
     """
 

@@ -3,6 +3,7 @@
 use crate::equilibrium::Equilibrium;
 use crate::scenario::Scenario;
 use crate::signals::SIGNAL_INTERVAL;
+use crate::threads::pool;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
@@ -12,7 +13,8 @@ use std::thread;
 
 /// Solves scenarios with the GIL released, in the order given; `progress(solved, all)` is called from the calling thread.
 ///
-/// Errors: those that `progress` or a signal handler raises; the solves then end.
+/// Errors: those that `progress` or a signal handler raises; the solves then end. `RuntimeError` where the system gives no
+/// threads.
 #[pyfunction]
 #[pyo3(signature = (scenarios, progress=None))]
 pub(crate) fn solve_many(
@@ -26,11 +28,13 @@ pub(crate) fn solve_many(
         false => ControlFlow::Continue(()),
     };
     let solve = |scenario: &Py<Scenario>| Equilibrium::timed(&scenario.get().0, &mut || proceed());
+    let pool = pool()?;
     py.detach(|| {
         thread::scope(|scope| {
             let (sender, solved) = channel();
             let all = scenarios.len();
             let scenarios = scenarios.as_slice();
+            let pool = &pool;
             let solves = scope.spawn(move || {
                 let outcomes = scenarios.par_iter().map_with(sender, |sender, scenario| {
                     let found = solve(scenario);
@@ -38,7 +42,7 @@ pub(crate) fn solve_many(
                     let _ = sender.send(());
                     found
                 });
-                outcomes.collect()
+                pool.install(|| outcomes.collect())
             });
             let waited = wait(&solved, all, progress.as_ref());
             stop.store(waited.is_err(), Ordering::Relaxed);

@@ -3,6 +3,7 @@
 use crate::equilibrium::Equilibrium;
 use crate::scenario::Scenario;
 use crate::signals::SIGNAL_INTERVAL;
+use crate::threads::pool;
 use fishbone::analysis::branches::{self as core, SearchSettings, Watch};
 use pyo3::prelude::*;
 use rayon::prelude::*;
@@ -39,7 +40,8 @@ impl Watch for Counter {
 /// `budget` is the greatest numbers of sums of waves to start from, of minima to perturb and of equilibria to continue,
 /// where they are to be fewer than the defaults: a search of moments, which may miss some equilibria.
 ///
-/// Errors: those that `progress` or a signal handler raises; the search then ends.
+/// Errors: those that `progress` or a signal handler raises; the search then ends. `RuntimeError` where the system gives no
+/// threads.
 #[pyfunction]
 #[pyo3(signature = (scenario, progress=None, budget=None))]
 pub(crate) fn branches(
@@ -55,11 +57,12 @@ pub(crate) fn branches(
         settings.continued = continued;
     }
     let counter = Counter::default();
+    let pool = pool()?;
     py.detach(|| {
         thread::scope(|scope| {
             let search = scope.spawn(|| {
                 let run = |count: usize, task: &(dyn Fn(usize) + Sync)| {
-                    (0..count).into_par_iter().for_each(task);
+                    pool.install(|| (0..count).into_par_iter().for_each(task));
                 };
                 core::branches(&scenario.0, &settings, &run, &counter)
             });

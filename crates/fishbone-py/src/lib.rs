@@ -5,12 +5,14 @@ mod batch;
 mod branches;
 mod equilibrium;
 mod errors;
+mod exclusive;
 mod follow;
 mod names;
 mod scenario;
 mod sensitivity;
 mod signals;
 mod solve;
+mod threads;
 mod tracker;
 
 /// The compiled core of fishbone; `fishbone` itself is its public face.

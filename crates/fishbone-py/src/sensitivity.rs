@@ -2,13 +2,13 @@
 
 use crate::array::{self, Grid, Points, Scalars};
 use crate::errors::raised;
+use crate::exclusive::Exclusive;
 use fishbone::analysis::sensitivity::{self, Change, Motion, NoSensitivity, Parameters};
 use fishbone::geometry::Wrench;
 use nalgebra::Vector3;
 use numpy::ndarray::{ArrayView1, ArrayView2};
 use numpy::{IntoPyArray, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
-use std::sync::{Mutex, PoisonError};
 
 /// Derivatives by supports, rigidity, natural bend, [width, thickness, Poisson's ratio], gravity.
 type Gradient<'py> = (Points<'py>, Scalars<'py>, Scalars<'py>, [f64; 3], [f64; 3]);
@@ -18,7 +18,7 @@ type Gradient<'py> = (Points<'py>, Scalars<'py>, Scalars<'py>, [f64; 3], [f64; 3
 /// Errors: `NoSensitivity` if the supports cannot make a motion.
 #[pyclass(frozen, module = "fishbone._core")]
 pub(crate) struct Sensitivity {
-    inner: Mutex<sensitivity::Sensitivity>,
+    inner: Exclusive<sensitivity::Sensitivity>,
     /// Supports, nodes, segments.
     shape: (usize, usize, usize),
 }
@@ -27,7 +27,7 @@ impl Sensitivity {
     pub(crate) fn new(inner: sensitivity::Sensitivity) -> Self {
         Self {
             shape: (inner.supports(), inner.nodes(), inner.segments()),
-            inner: Mutex::new(inner),
+            inner: Exclusive::new(inner),
         }
     }
 
@@ -37,8 +37,8 @@ impl Sensitivity {
         py: Python<'_>,
         product: impl FnOnce(&mut sensitivity::Sensitivity) -> Result<T, NoSensitivity> + Send,
     ) -> PyResult<T> {
-        // A poisoned lock is taken all the same: a product uses nothing of one that has panicked.
-        py.detach(|| product(&mut self.inner.lock().unwrap_or_else(PoisonError::into_inner)))
+        self.inner
+            .with(py, |sensitivity, _| product(sensitivity))?
             .map_err(|error| raised(py, &error))
     }
 }

@@ -3,26 +3,62 @@
 use crate::array::{self, Grid, Points, Scalars};
 use crate::equilibrium::Equilibrium;
 use crate::errors::{invalid_scenario, raised};
+use crate::exclusive::Exclusive;
 use crate::scenario::Scenario;
-use crate::signals::Signals;
 use fishbone::analysis::tracking as core;
 use fishbone::names::Named;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use numpy::IntoPyArray;
 use pyo3::prelude::*;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// An equilibrium that is followed while one of its supports moves.
 #[pyclass(frozen, module = "fishbone._core")]
-pub(crate) struct Tracker(Mutex<core::Tracker>);
+pub(crate) struct Tracker {
+    moving: Exclusive<core::Tracker>,
+    /// Locked to be copied alone, never while the GIL is waited for.
+    shown: Mutex<Shown>,
+}
+
+/// The shape after the last update, which can be read during the next one.
+#[derive(Default)]
+struct Shown {
+    energy: f64,
+    nodes: Vec<f64>,
+    positions: Vec<Vector3<f64>>,
+    frames: Vec<Matrix3<f64>>,
+    bends: Vec<f64>,
+    rib_slopes: Vec<f64>,
+}
+
+impl Shown {
+    /// Copies the shape of a tracker.
+    fn copy(&mut self, tracker: &core::Tracker) {
+        fn fill<T>(values: &mut Vec<T>, with: impl IntoIterator<Item = T>) {
+            values.clear();
+            values.extend(with);
+        }
+        self.energy = tracker.energy();
+        fill(&mut self.nodes, tracker.nodes());
+        fill(&mut self.positions, tracker.positions());
+        fill(&mut self.frames, tracker.frames().copied());
+        fill(&mut self.bends, tracker.bends());
+        fill(&mut self.rib_slopes, tracker.rib_slopes());
+    }
+}
 
 /// Status, whether it snapped, energy, iterations, largest residual, largest displacement and energy released in snaps.
 type Updated = (&'static str, bool, f64, usize, f64, f64, f64);
 
 impl Tracker {
-    fn lock(&self) -> MutexGuard<'_, core::Tracker> {
-        // A poisoned lock is taken all the same: an update that has panicked is not resumed.
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    /// Copies a part of the shape. No object of Python is made meanwhile: this may run other Python code.
+    fn read<T>(&self, part: impl FnOnce(&Shown) -> T) -> T {
+        part(&self.shown())
+    }
+
+    fn shown(&self) -> MutexGuard<'_, Shown> {
+        // A poisoned lock is taken all the same: the next update copies the whole shape.
+        self.shown.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -33,88 +69,93 @@ impl Tracker {
     /// Errors: `NoTracker`.
     #[new]
     fn new(py: Python<'_>, equilibrium: &Equilibrium, support: usize) -> PyResult<Self> {
-        core::Tracker::new(equilibrium.core(), support)
-            .map(|tracker| Self(Mutex::new(tracker)))
-            .map_err(|error| raised(py, &error))
+        let tracker =
+            core::Tracker::new(equilibrium.core(), support).map_err(|error| raised(py, &error))?;
+        let mut shown = Shown::default();
+        shown.copy(&tracker);
+        Ok(Self {
+            moving: Exclusive::new(tracker),
+            shown: Mutex::new(shown),
+        })
     }
 
     /// (status, snapped, energy, iterations, largest residual, jump, energy released).
     ///
     /// Errors: `InvalidScenario` for a pose that no scenario may hold; those that a signal handler raises,
-    /// `KeyboardInterrupt` first of all.
+    /// `KeyboardInterrupt` first of all; `RuntimeError` inside of another update of this thread.
     fn update(&self, py: Python<'_>, position: [f64; 3], rotation: [f64; 3]) -> PyResult<Updated> {
         let [position, rotation] = [position, rotation].map(Vector3::from);
-        let mut signals = Signals::new();
-        let update = py.detach(|| {
-            self.lock()
-                .update(&position, &rotation, &mut || signals.proceed())
-        });
-        match (signals.raised, update) {
-            (Some(error), _) => Err(error),
-            (None, Err(refused)) => Err(invalid_scenario(py, &refused, None)),
-            (None, Ok(update)) => Ok((
-                update.status.name(),
-                update.snapped,
-                update.energy,
-                update.iterations,
-                update.residuals.largest(),
-                update.jump,
-                update.released,
-            )),
-        }
+        let update = self.moving.with(py, |tracker, signals| {
+            let update = tracker.update(&position, &rotation, &mut || signals.proceed());
+            self.shown().copy(tracker);
+            update
+        })?;
+        let update = update.map_err(|refused| invalid_scenario(py, &refused, None))?;
+        Ok((
+            update.status.name(),
+            update.snapped,
+            update.energy,
+            update.iterations,
+            update.residuals.largest(),
+            update.jump,
+            update.released,
+        ))
     }
 
     /// The present scenario and its equilibrium.
-    fn equilibrium(&self, py: Python<'_>) -> (Scenario, Equilibrium) {
-        py.detach(|| {
-            let found = Equilibrium::of(|| self.lock().equilibrium());
+    ///
+    /// Errors: as `update`, but for the pose.
+    fn equilibrium(&self, py: Python<'_>) -> PyResult<(Scenario, Equilibrium)> {
+        self.moving.with(py, |tracker, _| {
+            let found = Equilibrium::of(|| tracker.equilibrium());
             (Scenario(found.core().problem().clone()), found)
         })
     }
 
     #[getter]
     fn energy(&self) -> f64 {
-        self.lock().energy()
+        self.read(|shown| shown.energy)
     }
 
     /// Shapes: (n,).
     #[getter]
     fn u<'py>(&self, py: Python<'py>) -> Scalars<'py> {
-        self.lock().nodes().into_pyarray(py)
+        self.read(|shown| shown.nodes.clone()).into_pyarray(py)
     }
 
     /// Shapes: (n, 3).
     #[getter]
     fn position<'py>(&self, py: Python<'py>) -> Points<'py> {
-        let positions: Vec<_> = self.lock().positions().collect();
+        let positions = self.read(|shown| shown.positions.clone());
         array::points(py, &positions)
     }
 
     /// Shapes: (n, 3, 3).
     #[getter]
     fn frame<'py>(&self, py: Python<'py>) -> Grid<'py> {
-        let tracker = self.lock();
-        array::frames(py, tracker.frames())
+        let frames = self.read(|shown| shown.frames.clone());
+        array::frames(py, &frames)
     }
 
     /// Shapes: (n,).
     #[getter]
     fn bend<'py>(&self, py: Python<'py>) -> Scalars<'py> {
-        self.lock().bends().collect::<Vec<_>>().into_pyarray(py)
+        self.read(|shown| shown.bends.clone()).into_pyarray(py)
     }
 
     /// Shapes: (n,).
     #[getter]
     fn rib_slope<'py>(&self, py: Python<'py>) -> Scalars<'py> {
-        self.lock()
-            .rib_slopes()
-            .collect::<Vec<_>>()
-            .into_pyarray(py)
+        self.read(|shown| shown.rib_slopes.clone()).into_pyarray(py)
     }
 
     /// Force and moment of a support on the belt.
-    fn reaction(&self, support: usize) -> ([f64; 3], [f64; 3]) {
-        let wrench = self.lock().reaction(support);
-        (array::row(&wrench.force), array::row(&wrench.moment))
+    ///
+    /// Errors: as `equilibrium`.
+    fn reaction(&self, py: Python<'_>, support: usize) -> PyResult<([f64; 3], [f64; 3])> {
+        let wrench = self
+            .moving
+            .with(py, |tracker, _| tracker.reaction(support))?;
+        Ok((array::row(&wrench.force), array::row(&wrench.moment)))
     }
 }
