@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from fishbone import _core
-from fishbone.errors import InvalidArgument, InvalidScenario, NoSupport, NotConverged
+from fishbone.errors import InvalidArgument, InvalidScenario, NotConverged
+from fishbone.places import support_index
 from fishbone.sensitivity import Sensitivity
 
 if TYPE_CHECKING:
@@ -246,6 +247,9 @@ class Equilibrium:
         self.scenario = scenario
         self._inner = inner
         self._sensitivity: Sensitivity | None = None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Equilibrium, (self.scenario, self._inner)
 
     @property
     def status(self) -> Status:
@@ -588,7 +592,7 @@ class Equilibrium:
         Errors: `NoSensitivity` unless the equilibrium has converged to a minimum that its supports determine.
         """
         if self._sensitivity is None:
-            self._sensitivity = Sensitivity(self._inner.sensitivity())
+            self._sensitivity = Sensitivity(self._inner)
         return self._sensitivity
 
     def jacobian(self, support: Place) -> Floats:
@@ -605,19 +609,8 @@ class Equilibrium:
         return self.sensitivity().jacobian(self._support_index(support))
 
     def _support_index(self, support: Place) -> int:
-        if isinstance(support, int | np.integer):
-            count = len(self._inner.reactions)
-            try:
-                return range(count)[int(support)]
-            except IndexError:
-                raise _no_support(support, f"found {count} supports") from None
-        length = float(self.u[-1])
-        place = {"start": 0.0, "end": length}.get(support) if isinstance(support, str) else float(support)
         places = [at for at, _, _ in self._inner.reactions]
-        for index, at in enumerate(places):
-            if place is not None and math.isclose(at, place, abs_tol=1e-9 * length):
-                return index
-        raise _no_support(support, f'found supports at u = {places}, allowed one of them, "start", "end" or an index')
+        return support_index(support, places, float(self.u[-1]))
 
     def surface(self, n_across: int = 9) -> Floats:
         """Points of the surface, on every rib from the −ζ edge to the +ζ edge.
@@ -718,7 +711,7 @@ def solve(
     inner = _core.solve(core) if shape is None else _core.solve_from(core, *shape)
     equilibrium = Equilibrium(scenario, inner)
     if strict and equilibrium.status != "converged":
-        raise NotConverged(equilibrium, shape)
+        raise NotConverged(equilibrium)
     return equilibrium
 
 
@@ -761,12 +754,6 @@ def core_of(scenario: Scenario) -> _core.Scenario:
     if not isinstance(inner, _core.Scenario):
         raise InvalidArgument(f"scenario: found {type(scenario).__name__}, allowed a Scenario, as fishbone.load gives")
     return inner
-
-
-def _no_support(support: Place, found: str) -> NoSupport:
-    error = NoSupport(f"support {support!r}: {found}")
-    error.support = support
-    return error
 
 
 def _across(n_across: int) -> int:

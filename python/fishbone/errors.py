@@ -163,31 +163,16 @@ class MissingPackage(FishboneError, ImportError):  # noqa: N818
 class NotConverged(FishboneError):  # noqa: N818
     """A strict solve has not converged; `equilibrium` is its result."""
 
-    def __init__(self, equilibrium: Equilibrium, start: tuple[list[float], list[float]] | None = None) -> None:
+    def __init__(self, equilibrium: Equilibrium) -> None:
         super().__init__(f"{equilibrium.status}: {equilibrium.message}")
         self.status: Status = equilibrium.status
         """How the solve ended."""
         self.solve_message = equilibrium.message
         """The reason, and what to try."""
+        self.equilibrium = equilibrium
+        """The result of the solve."""
         self.scenario = equilibrium.scenario
         """The scenario of the solve."""
-        self._start = start
-        self._equilibrium: Equilibrium | None = equilibrium
-
-    @property
-    def equilibrium(self) -> Equilibrium:
-        """The result of the solve; an unpickled or copied error solves the scenario again at the first access."""
-        if self._equilibrium is None:
-            from fishbone.equilibrium import solve  # noqa: PLC0415 - `solve` raises this error
-
-            self._equilibrium = solve(self.scenario, start=self._start)
-        return self._equilibrium
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # The core's equilibria cannot be pickled; the same scenario leads to the same equilibrium.
-        return _revived, (type(self), self.args), self.__dict__ | {"_equilibrium": None}
-
-
-def _revived(kind: type[NotConverged], args: tuple[Any, ...]) -> NotConverged:
-    """An error without the arguments of its constructor; unpickling sets its attributes."""
-    return kind.__new__(kind, *args)
+        return type(self), (self.equilibrium,), self.__dict__

@@ -87,11 +87,24 @@ class Scenario:
         return hash(self._inner.to_json())
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Scenario.from_dict, (self.to_dict(),)
+        return _restored, (self.to_dict(), _core.__version__)
 
     def __repr__(self) -> str:
         arguments = ", ".join(f"{key}={value!r}" for key, value in self.to_dict().items())
         return f"Scenario({arguments})"
+
+
+def _restored(tables: Table, version: str) -> Scenario:
+    """The scenario that a version has pickled.
+
+    Errors: `InvalidScenario`, which names the version where it is another.
+    """
+    try:
+        return Scenario.from_dict(tables)
+    except InvalidScenario as error:
+        if version != _core.__version__:
+            error.args = (f"pickled by version {version} of fishbone: {error}",)
+        raise
 
 
 def load(path: str | os.PathLike[str]) -> Scenario:

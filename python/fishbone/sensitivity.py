@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -71,10 +71,14 @@ class Sensitivity:
     that continue each other without a joint stay without a joint when their natural bend changes.
     """
 
-    __slots__ = ("_inner",)
+    __slots__ = ("_inner", "_of")
 
-    def __init__(self, inner: _core.Sensitivity) -> None:
-        self._inner = inner
+    def __init__(self, of: _core.Equilibrium) -> None:
+        self._of = of
+        self._inner = of.sensitivity()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Sensitivity, (self._of,)
 
     def forward(  # noqa: PLR0913, PLR0917
         self,

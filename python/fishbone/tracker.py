@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from fishbone import _core
 from fishbone.equilibrium import Equilibrium, Reaction, solve
 from fishbone.errors import InvalidArgument
+from fishbone.places import support_index
 from fishbone.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -44,20 +45,61 @@ class Update(NamedTuple):
 class Tracker:
     """A minimum of a belt whose support moves: every update starts from the shape before, and stays on its branch.
 
-    `fb.Tracker(scenario)` solves the scenario first. `support` is named as for `Equilibrium.reaction`, and must hold a
-    position and a rotation. All properties are those after the last update that converged.
+    A tracker starts at an equilibrium, such as one of `branches`, at that of a scenario, which is solved first, or in
+    the `state` of another tracker. `support` is named as for `Equilibrium.reaction`, and must hold a position and a
+    rotation; a state has its own. All properties are those after the last update that converged.
+
+    `copy.copy`, `copy.deepcopy` and `pickle` make trackers that move by themselves, as `copy` does.
 
     Threads and handlers of signals may read the properties during an update: they get those before it. Of the methods
     one runs at a time: another thread waits, and a handler that interrupts one gets a `RuntimeError` from the others.
 
-    Errors: `NoTracker` where the solve finds no minimum, or where the support cannot be moved; `NoSupport`.
+    Errors: `NoTracker` where the solve finds no minimum, or where the support cannot be moved; `NoSupport`;
+    `InvalidArgument` for bytes that are no state of this version.
     """
 
-    def __init__(self, scenario: Scenario, support: Place = "end") -> None:
-        self._start = solve(scenario)
+    __slots__ = ("_inner",)
+    _inner: _core.Tracker
+
+    def __init__(self, start: Scenario | Equilibrium | bytes, support: Place = "end") -> None:
+        if isinstance(start, bytes):
+            self._inner = _core.Tracker.from_bytes(start)
+            return
+        found = start if isinstance(start, Equilibrium) else solve(start)
+        inner = found._inner  # noqa: SLF001 - of this package
         # The source's method has no reactions, and the core refuses it whatever the support.
-        inner = self._start._inner  # noqa: SLF001 - of this package
-        self._inner = _core.Tracker(inner, self._index_of(support) if inner.reactions else 0)
+        self._inner = _core.Tracker(inner, found._support_index(support) if inner.reactions else 0)  # noqa: SLF001
+
+    @classmethod
+    def restore(cls, state: bytes) -> Tracker:
+        """A tracker in the state of another one: the updates of both have the same results, bit for bit.
+
+        Errors: `InvalidArgument` for bytes that are no state of this version.
+        """
+        return cls(state)
+
+    def state(self) -> bytes:
+        """All that further updates depend on, as bytes for `restore`, also in another process."""
+        return self._inner.to_bytes()
+
+    def copy(self) -> Tracker:
+        """Another tracker in the same state, which moves by itself."""
+        return self._of(self._inner.copy())
+
+    def __copy__(self) -> Tracker:
+        return self.copy()
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Tracker:
+        return self.copy()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Tracker._of, (self._inner,)
+
+    @classmethod
+    def _of(cls, inner: _core.Tracker) -> Tracker:
+        tracker = cls.__new__(cls)
+        tracker._inner = inner  # noqa: SLF001 - its own class
+        return tracker
 
     def update(self, position: npt.ArrayLike, rotation: npt.ArrayLike) -> Update:
         """Moves the support to a position and a rotation vector, world axes, and follows the minimum.
@@ -115,7 +157,7 @@ class Tracker:
         return Equilibrium(Scenario._wrap(scenario), found)  # noqa: SLF001 - of this package
 
     def _index_of(self, support: Place) -> int:
-        return self._start._support_index(support)  # noqa: SLF001 - of this package
+        return support_index(support, self._inner.supports, float(self.u[-1]))
 
 
 def triple(name: str, values: npt.ArrayLike) -> list[float]:

@@ -5,6 +5,7 @@ use crate::errors::raised;
 use crate::scenario::Scenario;
 use crate::sensitivity::Sensitivity;
 use crate::signals::Signals;
+use crate::stored::{self, Reduced};
 use fishbone::analysis::margin::MarginSettings;
 use fishbone::board::curve::Curve;
 use fishbone::equilibrium;
@@ -16,6 +17,7 @@ use fishbone::surface::{self, PointStrain, Rib};
 use nalgebra::{Vector2, Vector3, Vector6};
 use numpy::IntoPyArray;
 use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyType};
 use std::convert::Infallible;
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -74,6 +76,32 @@ pub(crate) struct Equilibrium {
 
 #[pymethods]
 impl Equilibrium {
+    /// The result of its bytes, with the time of its solve.
+    ///
+    /// Errors: `InvalidArgument` of other bytes.
+    #[classmethod]
+    fn from_bytes(
+        _class: &Bound<'_, PyType>,
+        py: Python<'_>,
+        content: &[u8],
+        solve_time: f64,
+    ) -> PyResult<Self> {
+        let solved = stored::from_bytes(py, content)?;
+        Ok(Self { solved, solve_time })
+    }
+
+    /// What `pickle` and `copy` make it anew of.
+    fn __reduce__<'py>(
+        slf: &Bound<'py, Self>,
+    ) -> PyResult<Reduced<'py, (Bound<'py, PyBytes>, f64)>> {
+        let of = slf.get();
+        let bytes = stored::to_bytes(slf.py(), &of.solved)?;
+        Ok((
+            slf.get_type().getattr("from_bytes")?,
+            (bytes, of.solve_time),
+        ))
+    }
+
     #[getter]
     fn status(&self) -> &'static str {
         self.solved.status.name()

@@ -15,7 +15,8 @@ use pyo3::types::{PyString, PyTuple};
 use std::error::Error;
 
 /// The exception classes. Python defines them, for users to find them there.
-mod exception {
+pub(crate) mod exception {
+    pyo3::import_exception!(fishbone.errors, InvalidArgument);
     pyo3::import_exception!(fishbone.errors, InvalidScenario);
     pyo3::import_exception!(fishbone.errors, NoBranch);
     pyo3::import_exception!(fishbone.errors, NoMargin);

@@ -5,6 +5,7 @@ use crate::equilibrium::Equilibrium;
 use crate::errors::raised;
 use crate::scenario::Scenario;
 use crate::signals::Signals;
+use crate::stored::{self, Reduced};
 use fishbone::analysis::continuation::{self as core, Settings, Summary};
 use fishbone::analysis::path::{self, Motion};
 use fishbone::names::Named;
@@ -12,6 +13,7 @@ use nalgebra::Vector3;
 use numpy::IntoPyArray;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::PyType;
 
 /// A path through the space of scenarios.
 #[pyclass(frozen, module = "fishbone._core")]
@@ -141,6 +143,20 @@ type Report<'py> = (
 
 #[pymethods]
 impl Diagram {
+    /// The diagram of its bytes.
+    ///
+    /// Errors: `InvalidArgument` of other bytes.
+    #[classmethod]
+    fn from_bytes(_class: &Bound<'_, PyType>, py: Python<'_>, content: &[u8]) -> PyResult<Self> {
+        stored::from_bytes(py, content).map(Self)
+    }
+
+    /// What `pickle` and `copy` make it anew of.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
+        let bytes = stored::to_bytes(slf.py(), &slf.get().0)?;
+        Ok((slf.get_type().getattr("from_bytes")?, (bytes,)))
+    }
+
     /// Number of branches.
     #[getter]
     fn branches(&self) -> usize {

@@ -12,6 +12,7 @@ mod scenario;
 mod sensitivity;
 mod signals;
 mod solve;
+mod stored;
 mod threads;
 mod tracker;
 

@@ -5,11 +5,14 @@ use crate::equilibrium::Equilibrium;
 use crate::errors::{invalid_scenario, raised};
 use crate::exclusive::Exclusive;
 use crate::scenario::Scenario;
+use crate::stored::{self, Reduced};
 use fishbone::analysis::tracking as core;
+use fishbone::io::stored::Stored;
 use fishbone::names::Named;
 use nalgebra::{Matrix3, Vector3};
 use numpy::IntoPyArray;
 use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyType};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// An equilibrium that is followed while one of its supports moves.
@@ -18,6 +21,8 @@ pub(crate) struct Tracker {
     moving: Exclusive<core::Tracker>,
     /// Locked to be copied alone, never while the GIL is waited for.
     shown: Mutex<Shown>,
+    /// Arc length of every support.
+    supports: Vec<f64>,
 }
 
 /// The shape after the last update, which can be read during the next one.
@@ -56,6 +61,16 @@ impl Tracker {
         part(&self.shown())
     }
 
+    fn of(tracker: core::Tracker) -> Self {
+        let mut shown = Shown::default();
+        shown.copy(&tracker);
+        Self {
+            supports: tracker.supports(),
+            moving: Exclusive::new(tracker),
+            shown: Mutex::new(shown),
+        }
+    }
+
     fn shown(&self) -> MutexGuard<'_, Shown> {
         // A poisoned lock is taken all the same: the next update copies the whole shape.
         self.shown.lock().unwrap_or_else(PoisonError::into_inner)
@@ -69,14 +84,37 @@ impl Tracker {
     /// Errors: `NoTracker`.
     #[new]
     fn new(py: Python<'_>, equilibrium: &Equilibrium, support: usize) -> PyResult<Self> {
-        let tracker =
-            core::Tracker::new(equilibrium.core(), support).map_err(|error| raised(py, &error))?;
-        let mut shown = Shown::default();
-        shown.copy(&tracker);
-        Ok(Self {
-            moving: Exclusive::new(tracker),
-            shown: Mutex::new(shown),
-        })
+        let tracker = core::Tracker::new(equilibrium.core(), support);
+        tracker.map(Self::of).map_err(|error| raised(py, &error))
+    }
+
+    /// The tracker of its bytes.
+    ///
+    /// Errors: `InvalidArgument` of other bytes.
+    #[classmethod]
+    fn from_bytes(_class: &Bound<'_, PyType>, py: Python<'_>, content: &[u8]) -> PyResult<Self> {
+        stored::from_bytes(py, content).map(Self::of)
+    }
+
+    /// The state of the tracker as bytes.
+    ///
+    /// Errors: as `equilibrium`.
+    fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let bytes = self.moving.with(py, |tracker, _| tracker.to_bytes())?;
+        Ok(PyBytes::new(py, &bytes.map_err(stored::refused)?))
+    }
+
+    /// Another tracker in the same state, which moves by itself.
+    ///
+    /// Errors: as `equilibrium`.
+    fn copy(&self, py: Python<'_>) -> PyResult<Self> {
+        self.moving.with(py, |tracker, _| Self::of(tracker.clone()))
+    }
+
+    /// What `pickle` and `copy` make it anew of.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
+        let bytes = slf.get().to_bytes(slf.py())?;
+        Ok((slf.get_type().getattr("from_bytes")?, (bytes,)))
     }
 
     /// (status, snapped, energy, iterations, largest residual, jump, energy released).
@@ -110,6 +148,12 @@ impl Tracker {
             let found = Equilibrium::of(|| tracker.equilibrium());
             (Scenario(found.core().problem().clone()), found)
         })
+    }
+
+    /// Arc length of every support.
+    #[getter]
+    fn supports(&self) -> Vec<f64> {
+        self.supports.clone()
     }
 
     #[getter]

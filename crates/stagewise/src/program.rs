@@ -8,6 +8,7 @@ use nalgebra::{SMatrix, SVector};
 
 /// Objective and constraints of a programme at a point.
 #[derive(Debug, Clone, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Values {
     /// Objective.
     pub objective: f64,
@@ -19,6 +20,7 @@ pub struct Values {
 
 /// Multipliers of a programme's constraints, in the order of the [`Layout`].
 #[derive(Debug, Clone, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Multipliers {
     /// Multipliers of the equalities.
     pub equalities: Vec<f64>,
@@ -232,6 +234,7 @@ pub trait Distance: Clone {
 
 /// A stationary point, or an approximation of one, with the multipliers of its first-order conditions.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Stationary<P> {
     /// The point.
     pub point: P,

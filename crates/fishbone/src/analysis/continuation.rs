@@ -101,6 +101,7 @@ named!(impl NoBranch {
 /// Extent of a continuation. Lengths along a branch count the parameter of the path, from 0 to its length, and the motion of
 /// the belt in U alike.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub struct Settings {
     /// Longest step along a branch.
     pub step: f64,
@@ -116,6 +117,7 @@ pub struct Settings {
 
 /// Settings of the search for branches that cross at an event: its distances, and its tolerances for near and equal states.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub struct CrossingSettings {
     /// Distances before an apex at which a modal load leads off the branch, in the parameter of the path: tried in turn
     /// until one leads to another branch.
@@ -159,6 +161,7 @@ impl Default for Settings {
 
 /// The connected branches of equilibria along a path.
 #[derive(Debug, Clone)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub struct Diagram {
     /// The path.
     pub path: Path,
@@ -169,6 +172,7 @@ pub struct Diagram {
 
 /// A curve of equilibria.
 #[derive(Debug, Clone)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub struct Branch {
     /// Origin at an event of another branch; `None` at the start of the path.
     pub origin: Option<Origin>,
@@ -182,6 +186,7 @@ pub struct Branch {
 
 /// Origin of a branch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub struct Origin {
     /// The other branch.
     pub branch: usize,
@@ -191,6 +196,7 @@ pub struct Origin {
 
 /// An equilibrium of a branch.
 #[derive(Debug, Clone)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub struct State {
     /// Place on the path.
     pub place: f64,
@@ -250,6 +256,7 @@ named! {
 
 /// A place on a branch where the number of negative modes changes, or where other edges hold the ribs.
 #[derive(Debug, Clone)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub struct Event {
     /// Kind of the event.
     pub kind: Kind,
@@ -267,6 +274,7 @@ pub struct Event {
 
 /// The minimum downhill from a loss of stability.
 #[derive(Debug, Clone)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub struct Snapped {
     /// Place on the path, a little past the event.
     pub place: f64,

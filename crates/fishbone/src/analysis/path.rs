@@ -6,12 +6,13 @@ use crate::names::named;
 use crate::problem::{OutOfReach, Problem};
 use crate::scenario::error::ScenarioError;
 use nalgebra::Vector3;
+use std::any::Any;
 use std::fmt::Debug;
 use std::sync::Arc;
 use thiserror::Error;
 
 /// A change of a problem along a path.
-pub trait Change: Debug + Send + Sync {
+pub trait Change: Any + Debug + Send + Sync {
     /// The problem at a place on the path that begins at `base`, or a little before or beyond it.
     ///
     /// # Errors
@@ -53,7 +54,8 @@ pub struct Path {
 
 /// Poses of a support, one after the other; the first is its own.
 #[derive(Debug, Clone)]
-struct Poses {
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) struct Poses {
     support: usize,
     poses: Vec<Pose>,
     motion: Motion,
@@ -167,6 +169,12 @@ impl Path {
     /// The problem where the path begins.
     pub(crate) fn base(&self) -> &Problem {
         &self.base
+    }
+
+    /// The change along the path.
+    #[cfg(feature = "io")]
+    pub(crate) fn change(&self) -> &dyn Change {
+        &*self.change
     }
 
     /// Length of the path: 1, or the number of poses after the first.

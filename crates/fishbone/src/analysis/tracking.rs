@@ -62,9 +62,13 @@ pub struct Update {
 }
 
 /// An equilibrium and the support that moves.
+#[derive(Clone)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub struct Tracker(AnyLed);
 
 /// An equilibrium of either model of the strip.
+#[derive(Clone)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 enum AnyLed {
     Developable(Box<Led<DevelopableEnergy, 2, 8>>),
     Shell(Box<Led<Shell, FIELDS, 12>>),
@@ -96,6 +100,11 @@ impl Tracker {
             }
         };
         Ok(Self(led))
+    }
+
+    /// Arc lengths of the supports, in the order of the scenario.
+    pub fn supports(&self) -> Vec<f64> {
+        of_led!(&self.0, led => led.supports())
     }
 
     /// Moves the support to a position and a rotation vector, world axes, and the belt with it.

@@ -16,6 +16,7 @@ use std::ops::ControlFlow;
 /// Estimated errors of a result by its mesh, relative and not negative; NaN where a quantity is not determined, or so small
 /// that its error is not known, and 0 where it is zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub struct MeshError {
     /// Error of the energy over the energy, with the zero of potentials at the belt's start, or over the elastic energy where
     /// that is larger.

@@ -60,6 +60,7 @@ named! {
 
 /// The reaction of a support on the belt.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub struct Reaction {
     /// Arc length of the support from the start.
     pub at: f64,
@@ -70,6 +71,7 @@ pub struct Reaction {
 
 /// The force of a link on the belt.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub struct LinkForce {
     /// Force on the belt at the link's point `to`, world axes; at `from` acts the opposite. A component is NaN where the
     /// shape does not determine it.
@@ -78,6 +80,7 @@ pub struct LinkForce {
 
 /// The outcome of a solve, in the units of its scenario.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub struct Equilibrium {
     /// The solved problem.
     pub(crate) problem: Problem,
@@ -111,6 +114,7 @@ pub struct Equilibrium {
     /// Iterations, over all attempts.
     pub iterations: usize,
     /// The error by the mesh, once it has been estimated.
+    #[cfg_attr(feature = "io", serde(with = "crate::io::stored::once"))]
     pub(crate) error: OnceLock<Option<MeshError>>,
     /// The solved programme; `None` where the method has no multipliers.
     pub(crate) solved: Option<AnySolved>,
@@ -142,6 +146,7 @@ named!(impl Uncertified {
 
 /// The solved programme of a belt.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) enum AnySolved {
     /// Of a developable belt.
     Developable(Box<Solved>),
@@ -151,6 +156,7 @@ pub(crate) enum AnySolved {
 
 /// A programme and its solution.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Solved<D = DevelopableEnergy, const F: usize = 2, const N: usize = 8> {
     pub(crate) program: BeltProgram<D, F, N>,
     pub(crate) at: Stationary<BeltPoint<F>>,

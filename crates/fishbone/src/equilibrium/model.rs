@@ -150,6 +150,7 @@ pub(crate) trait StripModel<const F: usize, const N: usize>: Density<F> {
 
 /// A stationary point of a strip's programme.
 #[derive(Debug, Clone)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) enum AnyStationary {
     /// Of a developable belt.
     Developable(Stationary<BeltPoint>),

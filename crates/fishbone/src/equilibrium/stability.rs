@@ -10,6 +10,7 @@ use stagewise::{Inertia, Outcome, Solution, Stationary, assess};
 /// The inertia of the second variation of the energy at an equilibrium, on the shapes that its supports and its active rib
 /// bounds leave free.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub struct Stability {
     /// Number of independent directions in which the energy falls.
     pub negative_modes: usize,

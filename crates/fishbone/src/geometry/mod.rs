@@ -11,6 +11,7 @@ use std::ops::{Add, Mul, Neg, Sub};
 
 /// A pose: the frame at a point of the spine and the point itself.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub struct Pose {
     /// Frame R = [ξ η ζ]: its columns are the normal, the tangent and the width direction, Eq. (2).
     pub frame: Matrix3<f64>,
@@ -73,6 +74,7 @@ impl Mul for Pose {
 
 /// A force and a moment about the point where they act, world axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub struct Wrench {
     /// Force.
     pub force: Vector3<f64>,

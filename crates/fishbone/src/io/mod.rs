@@ -1,10 +1,12 @@
-//! Input and output: scenarios as TOML and JSON, results as JSON, numbers of a scenario by the names of their fields.
+//! Input and output: scenarios as TOML and JSON, results as JSON, numbers of a scenario by the names of their fields, stored
+//! results.
 //!
 //! This room and the crates that it needs are built with the feature `io`.
 
 mod path;
 pub mod result;
 pub mod scenario;
+pub mod stored;
 
 #[cfg(test)]
 mod tests {

@@ -2,18 +2,19 @@
 
 use crate::analysis::path::{Change, NoPath, Path};
 use crate::problem::Problem;
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 /// Numbers of a scenario, each from its own value to another.
 #[derive(Debug)]
-struct Numbers {
+pub(super) struct Numbers {
     base: Value,
-    numbers: Vec<Number>,
+    pub(super) numbers: Vec<Number>,
 }
 
 /// A number of a scenario that changes.
-#[derive(Debug)]
-struct Number {
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct Number {
     /// Place in the scenario, a JSON pointer.
     pointer: String,
     from: f64,
@@ -28,7 +29,7 @@ impl Path {
     ///
     /// [`NoPath`] if a field of the scenario holds no number, or if the scenario at the end is not valid.
     pub fn numbers(problem: &Problem, changes: &[(String, f64)]) -> Result<Self, NoPath> {
-        let base = serde_json::to_value(problem.scenario()).expect("a scenario is plain data");
+        let base = tables(problem);
         let number = |(field, to): &(String, f64)| {
             let pointer = pointer(field);
             let found = base.pointer(&pointer);
@@ -50,6 +51,19 @@ impl Path {
         }
         Self::new(problem, Numbers { base, numbers })
     }
+}
+
+impl Numbers {
+    /// The change of numbers of a problem's scenario.
+    pub(super) fn of(problem: &Problem, numbers: Vec<Number>) -> Self {
+        let base = tables(problem);
+        Self { base, numbers }
+    }
+}
+
+/// The scenario of a problem as tables.
+fn tables(problem: &Problem) -> Value {
+    serde_json::to_value(problem.scenario()).expect("a scenario is plain data")
 }
 
 impl Change for Numbers {

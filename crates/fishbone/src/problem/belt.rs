@@ -63,6 +63,7 @@ pub(crate) struct Break {
 
 /// The lengths of the elements of a stretch, as shares of its length; of a stiffened stretch, which is one piece, none.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Division(pub Vec<f64>);
 
 impl Division {

@@ -8,6 +8,7 @@ use crate::strip::density::Density;
 
 /// A mesh, with the active edges of its pieces.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Mesh {
     /// The elements of every stretch of the belt.
     divisions: Vec<Division>,

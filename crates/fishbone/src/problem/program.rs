@@ -48,6 +48,7 @@ pub(crate) fn rows_of(multipliers: &[f64], place: usize) -> Rows {
 
 /// The programme of a belt. Lengths are in U and energies in mean R_f/U.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub struct BeltProgram<D = DevelopableEnergy, const F: usize = 2, const N: usize = 8> {
     /// Pieces in order along the spine.
     pub pieces: Vec<Piece>,
@@ -66,13 +67,16 @@ pub struct BeltProgram<D = DevelopableEnergy, const F: usize = 2, const N: usize
     /// Signed half turns after which the end of a closed belt joins its start; the ties of its seam are among the links.
     pub half_turns: Option<i32>,
     /// Obstacles that nodes must not enter.
+    #[cfg_attr(feature = "io", serde(with = "crate::io::stored::none"))]
     pub obstacles: Vec<NodeObstacle>,
     /// Prescribed fields of every node.
+    #[cfg_attr(feature = "io", serde(with = "crate::io::stored::arrays"))]
     fixed: Vec<[Option<f64>; F]>,
 }
 
 /// A shape of the belt.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub struct BeltPoint<const F: usize = 2> {
     /// Fields at every node: bend, rib slope, then any other fields of the density.
     pub fields: Vec<SVector<f64, F>>,

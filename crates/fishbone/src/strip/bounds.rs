@@ -21,6 +21,7 @@ pub(crate) type ActiveEdges<W = f64> = [Option<Edge<W>>; ACTIVE];
 
 /// A line or an arc of the board's outline as seen from the foot of a rib, by the tangent nearest to the foot.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub struct Edge<W = f64> {
     /// Direction of the nearest tangent along and across the spine at the foot, (cos δ, sin δ).
     pub direction: Vector2<f64>,

@@ -50,6 +50,7 @@ fn step(first: &Twist, second: &Twist, length: f64) -> Twist {
 
 /// The natural bend of a belt, with its Poisson's ratio.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub struct Curl<W = f64> {
     /// Natural bend k, the ω_ζ of the unloaded belt.
     pub bend: W,
@@ -84,6 +85,7 @@ impl Stock {
 
 /// The data of one element.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub struct Element {
     /// Length h along the spine.
     pub length: f64,

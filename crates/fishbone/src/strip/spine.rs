@@ -8,6 +8,7 @@ use nalgebra::{Vector3, Vector4};
 
 /// The piece of the belt between a node of the spine and the next.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub enum Piece {
     /// A flexible stretch.
     Strip {
@@ -43,6 +44,7 @@ impl Piece {
 
 /// The spine at its nodes, in the units of the scenario.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub struct Spine {
     /// Width V of the belt.
     pub width: f64,
@@ -64,6 +66,7 @@ pub struct Spine {
 
 /// The fields of a strip of finite thickness beyond bend and rib slope, at every node of its spine, and what it is made of.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct CurvedRibs {
     /// Rate of the rib slope; the slope is cubic in between.
     pub(crate) slope_rate: Vec<f64>,
@@ -81,6 +84,7 @@ pub(crate) struct CurvedRibs {
 
 /// What the strain of an element depends on besides its curvature.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Sheet {
     /// Poisson's ratio ν.
     pub(crate) poisson: f64,

@@ -55,6 +55,7 @@ pub enum Outcome {
 
 /// Residuals of the first-order conditions, max-norms.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Residuals {
     /// Gradient of the Lagrangian by the unknowns, beyond what [rounding](Program::rounding) of the controls makes of it.
     pub stationarity: f64,

@@ -8,6 +8,7 @@ use crate::program::{Multipliers, Program, Scales, Values};
 use crate::{larger, largest};
 
 /// A point with its multipliers, the derivatives and the Newton step at the point, and the trial point.
+#[derive(Clone)]
 pub(crate) struct PrimalDual<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> {
     pub(crate) program: P,
     pub(crate) point: P::Point,

@@ -18,6 +18,7 @@ const CLEAR: f64 = 100.0;
 
 /// Numbers of eigenvalues of the second variation by their sign.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Inertia {
     /// Number of negative eigenvalues.
     pub negative: usize,

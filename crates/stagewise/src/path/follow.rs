@@ -24,6 +24,7 @@ pub struct Followed {
 }
 
 /// A minimum with the work arrays to follow it: only programmes with constraints between pairs allocate on the way.
+#[derive(Clone)]
 pub struct Follower<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> {
     iterate: PrimalDual<P, X, U, N>,
     settings: FollowSettings,
@@ -103,6 +104,11 @@ where
     /// Residuals at the present minimum.
     pub fn residuals(&mut self) -> Residuals {
         self.iterate.residuals()
+    }
+
+    /// The present minimum with its multipliers.
+    pub fn minimum(&self) -> &Stationary<P::Point> {
+        &self.last
     }
 
     /// Multipliers at the present minimum.

@@ -7,6 +7,7 @@ use nalgebra::{Matrix6, SMatrix, UnitQuaternion, Vector3};
 
 /// Conditions between two nodes.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub struct NodeLink {
     /// The two nodes.
     pub nodes: [usize; 2],
@@ -16,6 +17,7 @@ pub struct NodeLink {
 
 /// State of one node that follows from another.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub enum Tie {
     /// Position, at a fixed offset in world axes, Eq. (35).
     Offset(Vector3<f64>),

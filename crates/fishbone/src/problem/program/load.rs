@@ -5,6 +5,7 @@ use nalgebra::{Matrix6, Vector3, Vector6};
 
 /// A dead force at a node, or off it at the end of a lever fixed in the node's frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub struct DeadForce {
     /// Force, world axes.
     pub force: Vector3<f64>,
@@ -14,6 +15,7 @@ pub struct DeadForce {
 
 /// A dead force and the node that it acts on.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub struct NodeLoad {
     /// Index of the node.
     pub node: usize,

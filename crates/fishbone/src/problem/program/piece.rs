@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 
 /// A piece of the belt between a node and the next.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub enum Piece {
     /// A flexible element.
     Strip(Element),

@@ -7,6 +7,7 @@ use std::f64::consts::TAU;
 
 /// The prescribed part of a node's frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub enum Hold {
     /// Nothing.
     Free,
@@ -43,6 +44,7 @@ impl Hold {
 
 /// Conditions at one node.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub struct NodeSupport {
     /// Index of the node.
     pub node: usize,

@@ -7,6 +7,7 @@ pub(crate) const MODES: usize = MOST - 2;
 
 /// Gauss's rule on [−1, 1], with the operator that integrates a polynomial through its points twice.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Across {
     /// Number of points.
     pub(crate) points: usize,

@@ -13,6 +13,7 @@ pub(super) const CLOSEST: f64 = 0.9;
 /// with the share `y = s V/2` of the convergence at which ribs meet, its excess `w = y − κ_g V/2` over that of square ribs, and
 /// `h̃ = √(D/(E h))`. It vanishes where ribs are square.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Gauge {
     /// Weight ε of the squares of slope and excess.
     pub(crate) slopes: f64,

@@ -37,6 +37,7 @@ pub(crate) const FIELDS: usize = 6;
 
 /// Energy of a strip of finite width and thickness.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Shell {
     /// The term that chooses one of the rib slopes which describe nearly the same surface.
     gauge: Gauge,

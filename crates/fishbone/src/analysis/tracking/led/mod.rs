@@ -1,6 +1,8 @@
 //! An equilibrium of any model of the strip, led by one of its supports.
 
 mod mesh;
+#[cfg(feature = "io")]
+mod stored;
 mod way;
 
 use super::{NoTracker, Update};
@@ -12,7 +14,7 @@ use crate::problem::{Mesh, Problem, Units};
 use crate::scenario::error::ScenarioError;
 use crate::scenario::{Scenario, SegmentSpec, SupportSpec};
 use nalgebra::{SVector, Vector3};
-use stagewise::{Distance, FollowSettings, Follower, Program, Solution};
+use stagewise::{Distance, FollowSettings, Follower, Program, Solution, Stationary};
 use std::ops::ControlFlow;
 use way::{Way, distance};
 
@@ -23,6 +25,7 @@ const SWITCHES: usize = 40;
 const PAST: f64 = 1e-5;
 
 /// An equilibrium of a model of the strip and the support that moves.
+#[derive(Clone)]
 pub(super) struct Led<D: StripModel<F, N>, const F: usize, const N: usize> {
     /// The problem at the tracker's start.
     problem: Problem,
@@ -56,13 +59,7 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
         let Pose { frame, position } = problem
             .clamp(support)
             .ok_or(NoTracker::NotClamped(support))?;
-        let settings = FollowSettings {
-            tolerance: problem.tolerance(),
-            smallest_jump: problem.snap_size(),
-            jumps: false,
-        };
-        let follower = Follower::new(solved.program.clone(), settings, &solved.at);
-        let follower = follower.ok_or(NoTracker::Marginal)?;
+        let follower = Self::follower(&problem, solved.program.clone(), &solved.at)?;
         let (units, origin) = (problem.units(), problem.origin());
         let (program, point) = (&solved.program, &solved.at.point);
         let stored = program.elastic_energy(&point.fields) + program.load_potential(&point.poses);
@@ -80,6 +77,27 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
             problem,
             follower,
         })
+    }
+
+    /// Starts to follow a minimum.
+    fn follower(
+        problem: &Problem,
+        program: BeltProgram<D, F, N>,
+        minimum: &Stationary<BeltPoint<F>>,
+    ) -> Result<Follower<BeltProgram<D, F, N>, 6, F, N>, NoTracker> {
+        let settings = FollowSettings {
+            tolerance: problem.tolerance(),
+            smallest_jump: problem.snap_size(),
+            jumps: false,
+        };
+        Follower::new(program, settings, minimum).ok_or(NoTracker::Marginal)
+    }
+
+    /// As [`Tracker::supports`](super::Tracker::supports).
+    pub(super) fn supports(&self) -> Vec<f64> {
+        let supports = self.problem.scenario().supports.iter();
+        let arc_length = |support: &SupportSpec| support.at.arc_length(self.units().length);
+        supports.map(arc_length).collect()
     }
 
     /// As [`Tracker::update`](super::Tracker::update).
