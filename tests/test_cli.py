@@ -244,7 +244,7 @@ def test_a_result_is_written_whole_or_not_at_all(run, monkeypatch, example_file)
 
     monkeypatch.setattr(Path, "replace", full)
     code, _, err = run("solve", example_file, "--out", "a.json")
-    assert code == 2
+    assert code == 74
     assert_one_line(err, "a.json", "No space left")
     assert [path.name for path in Path().iterdir()] == ["a.json"]
     assert Path("a.json").read_text("utf-8") == "as before"

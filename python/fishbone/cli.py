@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import csv
+import errno
 import io
 import json
 import math
+import os
 from itertools import compress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
@@ -16,15 +18,17 @@ import click
 import fishbone
 from fishbone import examples as shipped
 from fishbone.errors import FishboneError, NoBranch
-from fishbone.files import check_writable, write_whole
+from fishbone.files import check_writable, identity, write_all
 from fishbone.follow import out_of_reach
 from fishbone.names import EnergyModel
 from fishbone.progress import progress
+from fishbone.terminal import settle, write_line, write_out
+from fishbone.text import shown
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 
-    from rich.console import Console
+    from rich.console import Group
 
     from fishbone.equilibrium import Equilibrium
     from fishbone.follow import Columns, Diagram
@@ -49,39 +53,110 @@ class NoEquilibrium(Failure):
     exit_code = 3
 
 
+class NoRoom(Failure):
+    """A file or standard output takes no more bytes, as on a full disk; the exit code is EX_IOERR of sysexits.h."""
+
+    exit_code = 74
+
+
 class Interrupted(Failure):
     """Ctrl-C was pressed; the exit code is that of shells."""
 
     exit_code = 130
 
 
-def _output(*suffixes: str) -> Callable[[click.Context, click.Parameter, Path | None], Path | None]:
-    """A check of an output file, so that an invalid path is refused before the solve."""
+class Unread(Failure):
+    """Nobody reads standard output any more; the exit code is that of shells for a broken pipe."""
 
-    def check(ctx: click.Context, param: click.Parameter, path: Path | None) -> Path | None:
-        obstacle = None if path is None else check_writable(path, suffixes)
+    exit_code = 141
+
+
+_NO_ROOM = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
+"""Errors of a disk, a quota or a device that takes no more bytes."""
+_WIDE = 160
+
+
+def _failure(error: OSError) -> Failure:
+    """The failure of a file or, where the error names none, of standard output."""
+    if isinstance(error, BrokenPipeError):
+        kind: type[Failure] = Unread
+    else:
+        kind = NoRoom if error.errno in _NO_ROOM else Invalid
+    return kind(f"{error.filename or 'standard output'}: {error.strerror}")
+
+
+class Input(click.Path):
+    """A file to read."""
+
+    def __init__(self) -> None:
+        super().__init__(path_type=Path)
+
+
+class Output(click.Path):
+    """A file to write, of some suffixes; a path that cannot be written is refused before the solve."""
+
+    def __init__(self, *suffixes: str) -> None:
+        super().__init__(path_type=Path, readable=False)
+        self.suffixes = suffixes
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:  # noqa: ANN401 - as in click
+        """The path."""
+        path = Path(os.fsdecode(super().convert(value, param, ctx)))
+        obstacle = check_writable(path, self.suffixes)
         if obstacle is not None:
-            raise click.BadParameter(f"{path}: {obstacle}", ctx, param)
+            self.fail(f"{path}: {obstacle}", param, ctx)
         return path
 
-    return check
 
+class Command(click.Command):
+    """A command none of whose outputs is one of its inputs, or another output."""
 
-_PATH = click.Path(path_type=Path)
-_WIDE = 160
+    def invoke(self, ctx: click.Context) -> Any:  # noqa: ANN401 - as in click
+        """Runs the command."""
+        known: dict[Hashable, click.Parameter] = {}
+        for kind in (Input, Output):
+            for param, path in self._files(ctx, kind):
+                other = known.setdefault(identity(path), param)
+                if kind is Output and other is not param:
+                    found = f"found the file of {other.get_error_hint(ctx)} itself"
+                    raise click.BadParameter(f"{path}: {found}, allowed another file", ctx, param)
+        return super().invoke(ctx)
+
+    def _files(self, ctx: click.Context, kind: type[click.Path]) -> Iterator[tuple[click.Parameter, Path]]:
+        """The paths of a kind, with their parameters."""
+        for param in self.params:
+            path = ctx.params.get(param.name or "")
+            if isinstance(param.type, kind) and path is not None:
+                yield param, path
 
 
 class Commands(click.Group):
     """Converts errors and interrupts of a command into an exit code and one line."""
 
+    command_class = Command
+
+    def make_context(self, *args: Any, **extra: Any) -> click.Context:  # noqa: ANN401 - as in click
+        """Reads the arguments, and prints help and version."""
+        with _converted():
+            return super().make_context(*args, **extra)
+
     def invoke(self, ctx: click.Context) -> Any:  # noqa: ANN401 - as in click
         """Runs the command."""
-        try:
+        with _converted():
             return super().invoke(ctx)
-        except FishboneError as error:
-            raise Invalid(str(error)) from error
-        except KeyboardInterrupt:
-            raise Interrupted("interrupted") from None
+
+
+@contextlib.contextmanager
+def _converted() -> Iterator[None]:
+    """Converts errors into failures, before click ends the program at a broken pipe in its own way."""
+    try:
+        yield
+    except FishboneError as error:
+        raise Invalid(str(error)) from error
+    except OSError as error:
+        raise _failure(error) from error
+    except KeyboardInterrupt:
+        raise Interrupted("interrupted") from None
 
 
 @click.group(cls=Commands, invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
@@ -90,22 +165,20 @@ class Commands(click.Group):
 def command(context: click.Context) -> None:
     """Equilibrium shapes of thin belts."""
     if context.invoked_subcommand is None:
-        click.echo(context.get_help())
+        write_out(f"{context.get_help()}\n")
 
 
 @command.command()
-@click.argument("file", type=_PATH)
-@click.option("--out", type=_PATH, callback=_output(".json"), help="Write the result: .json.")
+@click.argument("file", type=Input())
+@click.option("--out", type=Output(".json"), help="Write the result: .json.")
 @click.option(
     "--figure",
-    type=_PATH,
-    callback=_output(".png", ".pdf", ".svg"),
+    type=Output(".png", ".pdf", ".svg"),
     help="Draw top, front and side view: .png, .pdf or .svg.",
 )
 @click.option(
     "--mesh",
-    type=_PATH,
-    callback=_output(".stl", ".ply", ".obj", ".glb"),
+    type=Output(".stl", ".ply", ".obj", ".glb"),
     help="Write the surface: .stl, .ply, .obj or .glb.",
 )
 @click.option("--energy", type=click.Choice(get_args(EnergyModel)), help="The elastic energy, in place of the file's.")
@@ -137,7 +210,6 @@ def solve(  # noqa: PLR0913 - one for each option
     if is_all and mesh is not None:
         raise Invalid("--mesh: found with --all, allowed without it: a mesh is that of one shape")
     pictures = _pictures(figure, mesh)
-    _spare(file, out)
     scenario = fishbone.load(file)
     if energy is not None:
         scenario = fishbone.Scenario.from_dict(scenario.to_dict() | {"energy": energy})
@@ -152,9 +224,9 @@ def solve(  # noqa: PLR0913 - one for each option
         if converged:
             subject = converged if is_all else converged[0]
             contents |= {path: encode_picture(subject, path.suffix) for path, encode_picture in pictures}
-        _write_all(contents)
+        write_all(contents)
     if as_json:
-        click.echo(text, nl=False)
+        write_out(text)
     if not converged:
         raise NoEquilibrium(f"{file}: {_reason(found[0])}")
     if not as_json:
@@ -172,11 +244,6 @@ def _all(scenario: fishbone.Scenario) -> list[Equilibrium]:
         return fishbone.branches(
             scenario, progress=lambda done, planned: state.show("searching", done / max(planned, 1))
         )
-
-
-def _spare(file: Path, out: Path | None) -> None:
-    if out is not None and out.resolve() == file.resolve():
-        raise Invalid(f"{out}: found the scenario itself, allowed another file")
 
 
 def _pictures(figure: Path | None, mesh: Path | None) -> list[tuple[Path, Callable[[Any, str], bytes]]]:
@@ -210,18 +277,6 @@ def _encode_found(found: list[Equilibrium], *, is_all: bool) -> str:
     return encode_list(results) if is_all else encode(results[0])
 
 
-def _write_all(contents: dict[Path, bytes]) -> None:
-    for path, content in contents.items():
-        _write(path, content)
-
-
-def _write(path: Path, content: bytes) -> None:
-    try:
-        write_whole(path, content)
-    except OSError as error:
-        raise Invalid(f"{path}: not written: {error.strerror}") from error
-
-
 def _reason(equilibrium: Equilibrium) -> str:
     """The status and the message of a failed solve in one line."""
     return f"{equilibrium.status.replace('_', ' ')}: {' '.join(equilibrium.message.split())}"
@@ -230,15 +285,20 @@ def _reason(equilibrium: Equilibrium) -> str:
 def _print(equilibria: list[Equilibrium], *, is_all: bool) -> None:
     from fishbone.report import report, report_all  # noqa: PLC0415
 
-    _console().print(report_all(equilibria) if is_all else report(equilibria[0]))
+    _show(report_all(equilibria) if is_all else report(equilibria[0]))
 
 
-def _console() -> Console:
-    """The console for tables, of a fixed width where standard output is no terminal."""
+def _show(tables: Group) -> None:
+    """Prints tables, of a fixed width where standard output is no terminal."""
     from rich.console import Console  # noqa: PLC0415
 
     console = Console(highlight=False)
-    return console if console.is_terminal else Console(highlight=False, width=_WIDE)
+    if not console.is_terminal:
+        console = Console(highlight=False, width=_WIDE)
+    # rich would end the program at a broken pipe, and at a character that the encoding lacks, in its own way.
+    with console.capture() as text:
+        console.print(tables)
+    write_out(text.get())
 
 
 def _warn(file: Path, equilibria: list[Equilibrium]) -> None:
@@ -249,11 +309,11 @@ def _warn(file: Path, equilibria: list[Equilibrium]) -> None:
     is_sound = [one.stable is not False and one.crosses_itself is None for one in equilibria]
     shown = equilibria if len(equilibria) == 1 else list(compress(equilibria, is_sound))
     for warning in dict.fromkeys(warning for equilibrium in shown for warning in equilibrium.warnings):
-        click.echo(f"fishbone: {file}: warning: {warning}", err=True)
+        write_line(f"{file}: warning: {warning}")
 
 
 @command.command()
-@click.argument("file", type=_PATH)
+@click.argument("file", type=Input())
 @click.option(
     "--to",
     "numbers",
@@ -275,12 +335,11 @@ def _warn(file: Path, equilibria: list[Equilibrium]) -> None:
 @click.option("--states", type=int, default=1000, show_default=True, help="Greatest number of states of a branch.")
 @click.option("--branches", type=int, default=10, show_default=True, help="Greatest number of branches.")
 @click.option("--snaps", is_flag=True, help="Lead the belt along its minima, from snap to snap.")
-@click.option("--out", type=_PATH, callback=_output(".json"), help="Write all states: .json.")
-@click.option("--table", type=_PATH, callback=_output(".csv"), help="Write a report on all states: .csv.")
+@click.option("--out", type=Output(".json"), help="Write all states: .json.")
+@click.option("--table", type=Output(".csv"), help="Write a report on all states: .csv.")
 @click.option(
     "--figure",
-    type=_PATH,
-    callback=_output(".png", ".pdf", ".svg"),
+    type=Output(".png", ".pdf", ".svg"),
     help="Draw energy, height and force along the path: .png, .pdf or .svg.",
 )
 @click.option(
@@ -318,7 +377,6 @@ def follow(  # noqa: PLR0913 - one for each option
     if radius_limit is not None and not 0.0 < radius_limit < math.inf:
         raise Invalid(f"--radius-limit: found {radius_limit:g}, allowed a positive finite number")
     pictures = _pictures(figure, None)
-    _spare(file, out)
     scenario = fishbone.load(file)
     _warn_of_degrees(file, path)
     diagram = _followed(file, scenario, path, {"step": step, "states": states, "branches": branches, "snaps": snaps})
@@ -332,9 +390,9 @@ def follow(  # noqa: PLR0913 - one for each option
             contents[table] = encode_table(diagram.table())
         limit = {} if radius_limit is None else {"radius_limit": radius_limit}
         contents |= {path: encode_picture(diagram, path.suffix, **limit) for path, encode_picture in pictures}
-        _write_all(contents)
+        write_all(contents)
     if as_json:
-        click.echo(text, nl=False)
+        write_out(text)
     else:
         _print_diagram(diagram)
     _warn_of_coarse_mesh(file, diagram)
@@ -378,10 +436,9 @@ def _warn_of_degrees(file: Path, path: dict[str, Any] | fishbone.Poses) -> None:
         turns = [value for field, value in path.items() if ".rotation" in field or ".euler" in field]
     largest = max((math.hypot(*(turn if isinstance(turn, list) else [turn])) for turn in turns), default=0.0)
     if largest > math.tau * (1.0 + 1e-9):
-        click.echo(
-            f"fishbone: {file}: warning: the path turns a support to {largest:g} rad, which is more than a turn: "
-            "angles are in radians",
-            err=True,
+        write_line(
+            f"{file}: warning: the path turns a support to {largest:g} rad, which is more than a turn: "
+            "angles are in radians"
         )
 
 
@@ -391,14 +448,14 @@ def _warn_of_coarse_mesh(file: Path, diagram: Diagram) -> None:
 
     warning = coarse_mesh(diagram)
     if warning is not None:
-        click.echo(f"fishbone: {file}: {warning}", err=True)
+        write_line(f"{file}: {warning}")
 
 
 def _compare_radius(file: Path, diagram: Diagram, limit: float) -> None:
     """Prints where the belt is bent to less than a radius on its spine, or that it is nowhere."""
     from fishbone.report import below_limit  # noqa: PLC0415
 
-    click.echo(f"fishbone: {file}: {below_limit(diagram, limit)}", err=True)
+    write_line(f"{file}: {below_limit(diagram, limit)}")
 
 
 def _shortfall(diagram: Diagram) -> str:
@@ -426,7 +483,8 @@ def _path_of(
             raise Invalid(f"--to: found {number!r}, allowed FIELD=VALUE, as in supports[1].position[2]=0.4")
         if field in path:
             raise Invalid(f"--to: found {field} twice, allowed once")
-        path[field] = _value(field, value)
+        # The core takes UTF-8 alone.
+        path[shown(field)] = _value(field, value)
     return path
 
 
@@ -472,7 +530,7 @@ def encode_table(columns: Columns) -> bytes:
 def _print_diagram(diagram: Diagram) -> None:
     from fishbone.report import report_diagram  # noqa: PLC0415
 
-    _console().print(report_diagram(diagram))
+    _show(report_diagram(diagram))
 
 
 @command.command()
@@ -490,27 +548,32 @@ def examples(name: str | None, *, force: bool) -> None:
     path = Path(f"{name}.toml")
     if path.exists() and not force:
         raise Invalid(f"{path}: found it here already, allowed to be overwritten with --force")
-    _write(path, content.encode())
-    click.echo(f"{path} written; next: fishbone solve {path}")
+    write_all({path: content.encode()})
+    write_out(f"{path} written; next: fishbone solve {path}\n")
 
 
 def _list_examples() -> None:
     names = shipped.names()
     width = max(map(len, names), default=0)
     for name in names:
-        click.echo(f"{name:<{width}}  {shipped.summary(name)}".rstrip())
+        write_out(f"{name:<{width}}  {shipped.summary(name)}".rstrip() + "\n")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the command line and returns the exit code; never a traceback."""
+    try:
+        return _run(arguments)
+    finally:
+        settle()
+
+
+def _run(arguments: Sequence[str] | None) -> int:
     try:
         code = command.main(arguments, "fishbone", standalone_mode=False)
     except click.ClickException as error:
         return _fail(error.exit_code, error.format_message())
     except (click.Abort, KeyboardInterrupt):
         return _fail(Interrupted.exit_code, "interrupted")
-    except OSError as error:
-        return _fail(Failure.exit_code, str(error))
     except SystemExit:
         raise
     except BaseException as error:  # a panic of the core is not an Exception
@@ -519,5 +582,5 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _fail(exit_code: int, message: str) -> int:
-    click.echo(f"fishbone: {' '.join(message.split())}", err=True)
+    write_line(message)
     return exit_code

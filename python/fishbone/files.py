@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
+import errno
 import os
+import stat
+import tempfile
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    from collections.abc import Hashable, Iterator, Mapping
+
+_ANY_WRITES = stat.S_IWUSR | stat.S_IWGRP | stat.S_IWOTH
+"""The mode bits of those who may write."""
 
 
 def check_writable(path: Path, suffixes: tuple[str, ...]) -> str | None:
@@ -14,31 +22,101 @@ def check_writable(path: Path, suffixes: tuple[str, ...]) -> str | None:
     if path.suffix.lower() not in suffixes:
         return f"found {path.suffix or 'no suffix'}, allowed {', '.join(suffixes)}"
     try:
-        # A symbolic link stays a link: its target is replaced.
-        target = path.resolve()
-        exists = target.exists()
-    except (OSError, RuntimeError) as error:
-        return f"found a name that leads nowhere ({error}), allowed a file that can be written"
+        target = _target(path)
+        obstacle = _protection(target, _status(target))
+    except OSError as error:
+        return f"found a name that leads nowhere ({error.strerror}), allowed a file that can be written"
     folder = target.parent
     if not folder.is_dir():
         return f"found no folder {folder}, allowed an existing one"
-    if exists and not target.is_file():
-        return f"found {path}, which is no plain file, allowed a file"
-    if not os.access(folder, os.W_OK | os.X_OK):
+    if obstacle is None and not os.access(folder, os.W_OK | os.X_OK):
         return f"found the folder {folder} read-only, allowed one to write in"
-    return None
+    return obstacle
+
+
+def identity(path: Path) -> Hashable:
+    """Equal for paths that lead to one file, by symbolic and hard links too; the file need not exist."""
+    try:
+        target = _target(path)
+        status = _status(target)
+    except OSError:
+        # A path that leads nowhere is equal to itself alone.
+        return path
+    return target if status is None else (status.st_dev, status.st_ino)
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Writes a draft beside the file and moves the draft to its place, so that no reader sees a part of the file.
+    """Writes a file so that no reader sees a part of it, also where several write at once.
 
-    Errors: `OSError`; the file is then as it was before.
+    A file that exists keeps its mode; one that is read-only, or no plain file, stays as it is.
+
+    Errors: `OSError` with the path; the file is then as it was before.
     """
-    # A symbolic link stays a link: its target is replaced.
-    target = path.resolve()
-    draft = target.with_name(f".{target.name}.{os.getpid()}.part")
-    try:
+    write_all({path: content})
+
+
+def write_all(contents: Mapping[Path, bytes]) -> None:
+    """Writes files, each as `write_whole`, and none before there is room for all.
+
+    Errors: `OSError` with the path.
+    """
+    with contextlib.ExitStack() as drafts:
+        moves = []
+        for path, content in contents.items():
+            with _naming(path):
+                target = _target(path)
+                moves.append((path, drafts.enter_context(_draft(target, content)), target))
+        for path, draft, target in moves:
+            with _naming(path):
+                draft.replace(target)
+
+
+@contextlib.contextmanager
+def _draft(target: Path, content: bytes) -> Iterator[Path]:
+    """A file beside the target, with the content, and the mode of the target or else that of a new file."""
+    status = _status(target)
+    obstacle = _protection(target, status)
+    if obstacle is not None:
+        raise PermissionError(errno.EACCES, obstacle)
+    # In a folder of its own the name is short and free, and the mode of a new file is that of any other.
+    with tempfile.TemporaryDirectory(prefix=".", suffix=".part", dir=target.parent) as folder:
+        draft = Path(folder) / "draft"
         draft.write_bytes(content)
-        draft.replace(target)
-    finally:
-        draft.unlink(missing_ok=True)
+        if status is not None:
+            draft.chmod(stat.S_IMODE(status.st_mode))
+        yield draft
+
+
+@contextlib.contextmanager
+def _naming(path: Path) -> Iterator[None]:
+    """Puts the path of the caller into errors, in place of those of drafts."""
+    try:
+        yield
+    except OSError as error:
+        error.filename, error.filename2 = str(path), None
+        raise
+
+
+def _target(path: Path) -> Path:
+    """The file that a path leads to: a symbolic link stays a link."""
+    return Path(os.path.realpath(path))
+
+
+def _status(target: Path) -> os.stat_result | None:
+    """The status of a file; None where there is no file."""
+    try:
+        return target.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+
+
+def _protection(target: Path, status: os.stat_result | None) -> str | None:
+    """What keeps a file from being replaced, "found …, allowed …"; None where nothing does."""
+    if status is None:
+        return None
+    if not stat.S_ISREG(status.st_mode):
+        return f"found {target}, which is no plain file, allowed a file"
+    # The superuser may write to all files; a mode by which nobody writes is meant for all, too.
+    if not (status.st_mode & _ANY_WRITES and os.access(target, os.W_OK)):
+        return f"found {target} read-only, allowed a file that may be written"
+    return None

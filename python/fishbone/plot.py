@@ -51,6 +51,7 @@ from fishbone.scene import (
     is_rigid,
     support_kind,
 )
+from fishbone.text import shown_name
 from fishbone.units import scale, unit, without_rounding
 
 if TYPE_CHECKING:
@@ -238,9 +239,8 @@ def _draw(equilibrium: Equilibrium) -> Figure:
 
 
 def _title(equilibrium: Equilibrium) -> str:
-    name = equilibrium.scenario.to_dict().get("name") or "belt"
     status = "" if equilibrium.status == "converged" else f", {equilibrium.status.replace('_', ' ')}"
-    return f"{name}: {equilibrium.energy_model} energy {_energy(equilibrium)}{status}"
+    return f"{shown_name(equilibrium.scenario)}: {equilibrium.energy_model} energy {_energy(equilibrium)}{status}"
 
 
 def _energy(equilibrium: Equilibrium) -> str:
@@ -333,10 +333,9 @@ def _draw_overview(equilibria: Sequence[Equilibrium], viewer: ArrayLike) -> Figu
     side = _WIDTH / _COLUMNS
     figure = Figure(figsize=(side * columns, side * rows), layout="constrained")
     first = equilibria[0]
-    name = first.scenario.to_dict().get("name") or "belt"
     more = len(equilibria) - len(shown)
     rest = f"; {more} more not shown" if more else ""
-    figure.suptitle(f"{name}: {first.energy_model} energy{rest}", fontsize=10.0, parse_math=False)
+    figure.suptitle(f"{shown_name(first.scenario)}: {first.energy_model} energy{rest}", fontsize=10.0, parse_math=False)
     panels = figure.subplots(rows, columns, squeeze=False).ravel().tolist()
     for index, (axes, equilibrium) in enumerate(zip(panels, shown, strict=False)):
         draw_oblique(axes, equilibrium, viewer)
@@ -380,7 +379,7 @@ def _draw_diagram(diagram: Diagram, support: Place | None, limit: float | None) 
     name = f"angle of supports[{diagram.support}] [degrees]" if has_angle else diagram.parameter_name
     axes[-1].set_xlabel(name, parse_math=False)
     figure.align_ylabels(axes)
-    figure.suptitle(diagram.scenario.to_dict().get("name") or "belt", fontsize=10.0, parse_math=False)
+    figure.suptitle(shown_name(diagram.scenario), fontsize=10.0, parse_math=False)
     figure.legend(
         handles=list(chart.key(diagram, snaps=any(snaps), limit=limit is not None)),
         loc="outside lower center",

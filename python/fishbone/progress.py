@@ -7,7 +7,7 @@ import threading
 import time
 from typing import TYPE_CHECKING
 
-import click
+from fishbone.terminal import write_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -42,10 +42,8 @@ class Progress:
 @contextlib.contextmanager
 def progress(words: str) -> Iterator[Progress]:
     """Shows the progress of the work in its body: on a terminal a bar, else a line now and then."""
-    from rich.console import Console  # noqa: PLC0415
-
     state, done = Progress(words), threading.Event()
-    console = Console(stderr=True)
+    console = _console()
     show = _bar if console.is_terminal else _lines
     # The core releases the interpreter, so that a thread of its own can show that the work goes on.
     watch = threading.Thread(target=show, args=(state, done, console), daemon=True)
@@ -55,6 +53,17 @@ def progress(words: str) -> Iterator[Progress]:
     finally:
         done.set()
         watch.join()
+
+
+def _console() -> Console:
+    """The console of standard error. At a broken pipe it falls silent, where rich would close standard output."""
+    from rich.console import Console  # noqa: PLC0415
+
+    class ErrorConsole(Console):
+        def on_broken_pipe(self) -> None:
+            self.quiet = True
+
+    return ErrorConsole(stderr=True)
 
 
 def _bar(state: Progress, done: threading.Event, console: Console) -> None:
@@ -76,4 +85,4 @@ def _lines(state: Progress, done: threading.Event, _: Console) -> None:
     while not done.wait(wait):
         wait = time.monotonic() - start
         share = "" if state.share is None else f", {state.share:.0%}"
-        click.echo(f"fishbone: {state.words}{share}, after {wait:.0f} s", err=True)
+        write_line(f"{state.words}{share}, after {wait:.0f} s")

@@ -12,6 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from fishbone.follow import SNAP
+from fishbone.text import shown_name
 from fishbone.units import labelled, scale, unit, without_rounding
 
 if TYPE_CHECKING:
@@ -48,24 +49,21 @@ MINIMUM = {True: "yes", False: "no", None: "not known"}
 
 def report(equilibrium: Equilibrium) -> Group:
     """The tables that the command line prints for an equilibrium."""
-    tables = equilibrium.scenario.to_dict()
-    title = f"{tables.get('name') or 'belt'}: {equilibrium.energy_model} energy, {equilibrium.status}"
-    return Group(Text(title, style="bold"), Text(_supports(equilibrium)), _scalars(equilibrium), _vectors(equilibrium))
+    title = _title(equilibrium.scenario, f"{equilibrium.energy_model} energy, {equilibrium.status}")
+    return Group(title, Text(_supports(equilibrium)), _scalars(equilibrium), _vectors(equilibrium))
 
 
 def report_all(equilibria: Sequence[Equilibrium]) -> Group:
     """The table that the command line prints for the equilibria of a scenario: a row each."""
     first = equilibria[0]
-    name = first.scenario.to_dict().get("name") or "belt"
     count = "1 equilibrium" if len(equilibria) == 1 else f"{len(equilibria)} equilibria"
-    title = Text(f"{name}: {first.energy_model} energy, {count}", style="bold")
+    title = _title(first.scenario, f"{first.energy_model} energy, {count}")
     return Group(title, Text(_supports(first)), _equilibria(equilibria))
 
 
 def report_diagram(diagram: Diagram) -> Group:
     """The tables that the command line prints for a diagram: its branches and their events."""
-    name = diagram.scenario.to_dict().get("name") or "belt"
-    title = Text(f"{name}: equilibria along a path, parameter: {diagram.parameter_name}", style="bold")
+    title = _title(diagram.scenario, f"equilibria along a path, parameter: {diagram.parameter_name}")
     ends = [
         Text(f"branch {index} {_ending(branch)}") for index, branch in enumerate(diagram.branches) if branch.end in ENDS
     ]
@@ -81,6 +79,10 @@ def report_diagram(diagram: Diagram) -> Group:
         _events(diagram) if has_events else Text("no events"),
         *([left_out] if unconfirmed else []),
     )
+
+
+def _title(scenario: Scenario, words: str) -> Text:
+    return Text(f"{shown_name(scenario)}: {words}", style="bold")
 
 
 def _left_out(events: Sequence[Event]) -> str:
