@@ -174,6 +174,16 @@ def test_a_read_only_file_stays_as_it_is_from_python_too(equilibrium):
     assert path.read_bytes() == b"as before"
 
 
+def test_an_example_is_not_copied_over_a_read_only_file_by_force_either(run):
+    path = Path("example1.toml")
+    path.write_bytes(b"as before")
+    path.chmod(0o444)
+    code, out, err = run("examples", "example1", "--force")
+    assert (code, out) == (2, "")
+    assert_one_line(err, "example1.toml", "read-only")
+    assert path.read_bytes() == b"as before"
+
+
 def test_a_pipe_is_refused_and_stays_a_pipe():
     os.mkfifo("pipe.stl")
     with pytest.raises(PermissionError, match="no plain file"):
@@ -216,9 +226,9 @@ def test_a_folder_that_vanishes_during_the_solve_is_exit_2_and_nothing_is_writte
     Path("gone").mkdir()
     solve = fb.solve
     monkeypatch.setattr(fb, "solve", lambda scenario: (Path("gone").rmdir(), solve(scenario))[1])
-    code, out, err = run("solve", "a.json", "--figure", "b.png", "--out", "gone/b.json")
+    code, out, err = run("solve", "a.json", "--out", "b.json", "--figure", "gone/b.png")
     assert (code, out) == (2, "")
-    assert_one_line(err, str(Path("gone/b.json")), "No such file or directory")
+    assert_one_line(err, str(Path("gone/b.png")), "No such file or directory")
     assert names() == ["a.json"]
 
 
