@@ -24,8 +24,11 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-MIN_ACROSS, MAX_ACROSS = 2, 10_001
-"""Points on a rib. Two points determine a straight rib; ribs of the energy "shell" bend a little."""
+MIN_ACROSS, MAX_POINTS = 2, 5_000_000
+"""Points on a rib, and on the ribs of all nodes: a gigabyte with the triangles between them."""
+
+MIN_TOLERANCE = 1e-6
+"""Distance of an outline from its chords over the width of the belt."""
 
 MAX_MODES = 100
 """Number of modes, more than a mesh resolves."""
@@ -612,33 +615,41 @@ class Equilibrium:
         places = [at for at, _, _ in self._inner.reactions]
         return support_index(support, places, float(self.u[-1]))
 
+    def _across(self, n_across: int) -> int:
+        most = MAX_POINTS // len(self.u)
+        if not MIN_ACROSS <= n_across <= most:
+            raise InvalidArgument(f"n_across: found {n_across}, allowed {MIN_ACROSS} to {most} on {len(self.u)} nodes")
+        return n_across
+
     def surface(self, n_across: int = 9) -> Floats:
         """Points of the surface, on every rib from the −ζ edge to the +ζ edge.
 
         Shapes: (n, n_across, 3).
-        Errors: `InvalidArgument` where n_across is below 2.
+        Errors: `InvalidArgument` where n_across is below 2, or where all nodes have more than 5 million points.
         """
-        return self._inner.surface(_across(n_across))
+        return self._inner.surface(self._across(n_across))
 
     def mesh(self, n_across: int = 9) -> tuple[Floats, NDArray[np.int64]]:
         """Vertices and triangles of the surface.
 
         Shapes: (p, 3) and (m, 3).
-        Errors: `InvalidArgument` where n_across is below 2.
+        Errors: as `surface`.
         """
-        return self._inner.mesh(_across(n_across))
+        return self._inner.mesh(self._across(n_across))
 
     def outline(self, tolerance: float | None = None) -> Outline:
         """The outline of the flat board, exact except on arcs: chords are within `tolerance` of their arc.
 
-        The default tolerance is a thousandth of the width. A closed belt is cut open at its start.
+        The default tolerance is a thousandth of the width, the least a millionth. A closed belt is cut open at its start.
 
-        Errors: `InvalidArgument` where the tolerance is not positive.
+        Errors: `InvalidArgument` for another tolerance.
         """
+        width = float(self.scenario.to_dict()["belt"]["width"])
         if tolerance is None:
-            tolerance = 1e-3 * float(self.scenario.to_dict()["belt"]["width"])
-        if not 0.0 < tolerance < math.inf:
-            raise InvalidArgument(f"tolerance: found {tolerance}, allowed a positive finite number")
+            tolerance = 1e-3 * width
+        if not MIN_TOLERANCE * width <= tolerance < math.inf:
+            least = f"a finite number from {MIN_TOLERANCE * width:g}, a millionth of the width"
+            raise InvalidArgument(f"tolerance: found {tolerance}, allowed {least}")
         return Outline(*self._inner.outline(tolerance))
 
     def flat_spine(self) -> Floats:
@@ -659,9 +670,9 @@ class Equilibrium:
         """Vertices (y, z) and triangles of the flat board, in the order of the triangles of `mesh`.
 
         Shapes: (p, 2) and (m, 3). For a closed belt the vertices of the seam come twice: at the start and at the end.
-        Errors: `InvalidArgument` where n_across is below 2.
+        Errors: as `surface`.
         """
-        return self._inner.flat_mesh(_across(n_across))
+        return self._inner.flat_mesh(self._across(n_across))
 
     def material_points(self, flat: npt.ArrayLike) -> Floats:
         """The points (y, z) of the flat board on the bent belt; NaN for points off the board.
@@ -754,12 +765,6 @@ def core_of(scenario: Scenario) -> _core.Scenario:
     if not isinstance(inner, _core.Scenario):
         raise InvalidArgument(f"scenario: found {type(scenario).__name__}, allowed a Scenario, as fishbone.load gives")
     return inner
-
-
-def _across(n_across: int) -> int:
-    if not MIN_ACROSS <= n_across <= MAX_ACROSS:
-        raise InvalidArgument(f"n_across: found {n_across}, allowed {MIN_ACROSS} to {MAX_ACROSS}")
-    return n_across
 
 
 def _direction(direction: npt.ArrayLike) -> list[float]:

@@ -24,7 +24,7 @@ SUFFIXES = (".stl", ".ply", ".obj", ".glb")
 def mesh(equilibrium: Equilibrium, n_across: int = 9) -> trimesh.Trimesh:
     """The surface as triangles: open, without thickness, in the units of the scenario.
 
-    Errors: `InvalidArgument` where n_across is below 2.
+    Errors: `InvalidArgument` as `Equilibrium.mesh`.
     """
     vertices, triangles = equilibrium.mesh(n_across)
     # By default trimesh merges vertices, which would close the gap of a belt whose two ends touch.

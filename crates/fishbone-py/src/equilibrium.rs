@@ -8,7 +8,7 @@ use crate::signals::Signals;
 use crate::stored::{self, Reduced};
 use fishbone::analysis::margin::MarginSettings;
 use fishbone::board::curve::Curve;
-use fishbone::equilibrium;
+use fishbone::equilibrium::{self, MeshError};
 use fishbone::geometry::Wrench;
 use fishbone::names::Named;
 use fishbone::problem::Problem;
@@ -49,6 +49,17 @@ impl Equilibrium {
             solved,
             solve_time: start.elapsed().as_secs_f64(),
         })
+    }
+}
+
+impl Equilibrium {
+    /// The error by the mesh, which the core keeps once it is known, estimated with the GIL released.
+    ///
+    /// Errors: those that a signal handler raises.
+    fn estimate(&self, py: Python<'_>) -> PyResult<Option<MeshError>> {
+        let mut signals = Signals::new();
+        let error = py.detach(|| self.solved.error_while(&mut || signals.proceed()));
+        signals.raised.map_or(Ok(error), Err)
     }
 }
 
@@ -112,9 +123,11 @@ impl Equilibrium {
         &self.solved.message
     }
 
+    /// Errors: as `error`.
     #[getter]
-    fn warnings(&self) -> Vec<String> {
-        self.solved.warnings()
+    fn warnings(&self, py: Python<'_>) -> PyResult<Vec<String>> {
+        self.estimate(py)?;
+        Ok(self.solved.warnings())
     }
 
     #[getter]
@@ -182,10 +195,12 @@ impl Equilibrium {
     }
 
     /// (energy, position, force, radius), estimated with the GIL released; None where there is no estimate.
+    ///
+    /// Errors: those that a signal handler raises.
     #[getter]
-    fn error(&self, py: Python<'_>) -> Option<(f64, f64, f64, f64)> {
-        let error = py.detach(|| self.solved.error())?;
-        Some((error.energy, error.position, error.force, error.radius))
+    fn error(&self, py: Python<'_>) -> PyResult<Option<(f64, f64, f64, f64)>> {
+        let error = self.estimate(py)?;
+        Ok(error.map(|error| (error.energy, error.position, error.force, error.radius)))
     }
 
     /// Shapes: (n,).
@@ -523,9 +538,13 @@ impl Equilibrium {
     /// (eigenvalue, translation, rotation, bend, rib slope) of the lowest modes, found with the GIL released.
     ///
     /// Shapes: (n, 3), (n, 3), (n,), (n,).
-    /// Errors: `NoModes`.
+    /// Errors: `NoModes`; those that a signal handler raises.
     fn modes<'py>(&self, py: Python<'py>, count: usize) -> PyResult<Vec<Mode<'py>>> {
-        let modes = py.detach(|| self.solved.modes(count));
+        let mut signals = Signals::new();
+        let modes = py.detach(|| self.solved.modes(count, &mut || signals.proceed()));
+        if let Some(error) = signals.raised {
+            return Err(error);
+        }
         let modes = modes.map_err(|error| raised(py, &error))?;
         let mode = |mode: fishbone::analysis::modes::Mode| {
             (
@@ -550,8 +569,11 @@ impl Equilibrium {
     }
 
     /// The result schema as JSON, without `solve_time`.
-    fn to_json(&self) -> String {
-        self.solved.to_json()
+    ///
+    /// Errors: as `error`.
+    fn to_json(&self, py: Python<'_>) -> PyResult<String> {
+        self.estimate(py)?;
+        Ok(py.detach(|| self.solved.to_json()))
     }
 }
 

@@ -173,7 +173,7 @@ fn test_the_sources_own_method_never_calls_its_compromise_converged() {
     assert!(equilibrium.residuals.constraint > 1e-2);
     assert_near(equilibrium.highest_point().position.x, 0.35, 5e-3);
     let uncertified = Uncertified::NoMultipliers;
-    let modes = equilibrium.modes(1);
+    let modes = equilibrium.modes(1, &mut || ControlFlow::Continue(()));
     assert_eq!(modes, Err(NoModes::Uncertified(uncertified.clone())));
     let derivatives = equilibrium.sensitivity().map(drop);
     assert_eq!(derivatives, Err(NoSensitivity::Uncertified(uncertified)));

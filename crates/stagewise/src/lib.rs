@@ -29,8 +29,8 @@ pub use interior_point::{
 pub use layout::{Block, Layout};
 pub use linear::chain::{ByControls, Chain, Diagonal, NodeMatrix, NodeVector, Stage};
 pub use linear::{
-    Direction, Inertia, Mode, PairMatrix, Response, Singular, StageMatrix, lowest_modes, moved,
-    redundant_equalities,
+    Direction, Inertia, Mode, PairMatrix, Response, Singular, StageMatrix, lowest_modes,
+    lowest_modes_while, moved, redundant_equalities,
 };
 pub use linearisation::Linearisation;
 pub use path::{

@@ -5,6 +5,7 @@ use crate::equilibrium::{AnySolved, Equilibrium, Solved, Uncertified, left_free}
 use crate::names::named;
 use crate::strip::density::Density;
 use stagewise::{NodeVector, Singular};
+use std::ops::ControlFlow;
 use thiserror::Error;
 
 /// A motion of the belt from an equilibrium, one of the lowest of a set that the second variation does not couple; in the
@@ -43,15 +44,22 @@ named!(impl NoModes {
 
 impl Equilibrium {
     /// The lowest modes, rising; fewer than `count` where the mesh has no more. Motions that change nothing, of the whole
-    /// belt or of a uniform closed belt along itself, have the eigenvalue 0.
+    /// belt or of a uniform closed belt along itself, have the eigenvalue 0. The cost is that of 2 to 3 solves of a linear
+    /// system for each mode.
+    ///
+    /// `proceed` is asked now and then whether to go on; after `Break` the modes are approximations.
     ///
     /// # Errors
     ///
     /// [`NoModes`] unless the solve has converged.
-    pub fn modes(&self, count: usize) -> Result<Vec<Mode>, NoModes> {
+    pub fn modes(
+        &self,
+        count: usize,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Result<Vec<Mode>, NoModes> {
         match self.certified_any()? {
-            AnySolved::Developable(solved) => self.modes_of(solved, count),
-            AnySolved::Shell(solved) => self.modes_of(solved, count),
+            AnySolved::Developable(solved) => self.modes_of(solved, count, proceed),
+            AnySolved::Shell(solved) => self.modes_of(solved, count, proceed),
         }
     }
 
@@ -59,12 +67,13 @@ impl Equilibrium {
         &self,
         solved: &Solved<D, F, N>,
         count: usize,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Result<Vec<Mode>, NoModes> {
         let (program, mut at) = match left_free(&self.problem, &solved.program, &solved.at) {
             Some(free) => free,
             None => (solved.program.clone(), solved.at.clone()),
         };
-        let modes = stagewise::lowest_modes(&program, &mut at, count);
+        let modes = stagewise::lowest_modes_while(&program, &mut at, count, proceed);
         let units = self.problem.units();
         let length = units.length;
         let of_node = |node: usize, motion: &NodeVector<N>| {

@@ -253,59 +253,57 @@ struct Window<'a> {
     chain: &'a [Edge],
     /// Angle of the rib's normal.
     angle: f64,
-    /// Index of a piece, and the fractions of its length between which it counts.
-    pieces: Vec<(usize, [f64; 2])>,
     /// The piece beside the foot.
     start: usize,
+    /// The first piece ahead of the foot.
+    next: usize,
     is_open: bool,
 }
 
+/// A piece of a window: its index, and the fractions of its length between which it counts.
+type Facing = (usize, [f64; 2]);
+
 impl<'a> Window<'a> {
     fn new(chains: &'a Chains, side: usize, foot: &Foot) -> Self {
-        let chain = chains.edges[side].as_slice();
         let (start, is_own) = nearest_piece(chains, side, foot);
-        let mut window = Self {
-            chain,
+        Self {
+            chain: chains.edges[side].as_slice(),
             angle: foot.normal_angle(),
-            pieces: Vec::new(),
             start,
+            next: start + usize::from(is_own),
             is_open: chains.is_open,
-        };
-        let next = start + usize::from(is_own);
-        window.extend_back(next);
-        window.pieces.reverse();
-        let ends_inside = |&(index, [_, to]): &(usize, [f64; 2])| index == start && to < 1.0;
-        if !window.pieces.last().is_some_and(ends_inside) {
-            window.extend_forward(next);
-        }
-        window
-    }
-
-    fn extend_back(&mut self, end: usize) {
-        for index in (0..end).rev() {
-            let [from, to] = self.facing(index);
-            let is_first = self.pieces.is_empty() && index + 1 == end;
-            if from > to || (to < 1.0 && !is_first) {
-                break;
-            }
-            self.pieces.push((index, [from, to]));
-            if from > 0.0 {
-                break;
-            }
         }
     }
 
-    fn extend_forward(&mut self, start: usize) {
-        for index in start..self.chain.len() {
+    /// The pieces beside and behind the foot, from the nearest on.
+    fn back(&self) -> impl Iterator<Item = Facing> {
+        let mut ends = false;
+        (0..self.next).rev().map_while(move |index| {
             let [from, to] = self.facing(index);
-            if from > to || from > 0.0 {
-                break;
-            }
-            self.pieces.push((index, [from, to]));
-            if to < 1.0 {
-                break;
-            }
-        }
+            let is_first = index + 1 == self.next;
+            let counts = !ends && from <= to && (to >= 1.0 || is_first);
+            ends = from > 0.0;
+            counts.then_some((index, [from, to]))
+        })
+    }
+
+    /// The pieces ahead of the foot, from the nearest on; none where the window ends inside the piece beside it.
+    fn forward(&self) -> impl Iterator<Item = Facing> {
+        let ends_inside = |(index, [_, to]): Facing| index == self.start && to < 1.0;
+        let mut ends = self.back().next().is_some_and(ends_inside);
+        (self.next..self.chain.len()).map_while(move |index| {
+            let [from, to] = self.facing(index);
+            let counts = !ends && from <= to && from <= 0.0;
+            ends = to < 1.0;
+            counts.then_some((index, [from, to]))
+        })
+    }
+
+    /// The first and the last piece.
+    fn ends(&self) -> Option<[Facing; 2]> {
+        let first = self.back().last().or_else(|| self.forward().next())?;
+        let last = self.forward().last().or_else(|| self.back().next())?;
+        Some([first, last])
     }
 
     /// The fractions of a piece between which it heads forward across the rib; reversed where it nowhere does.
@@ -388,48 +386,56 @@ impl<'a> Window<'a> {
 
     /// The first or the last point of the window, if the line passes it within the tolerance.
     fn at_tip(&self, point: &Vector2<f64>, tolerance: f64) -> Option<End> {
-        let first = self
-            .pieces
-            .first()
-            .map(|&(index, [from, _])| self.end_at(index, from));
-        let last = self
-            .pieces
-            .last()
-            .map(|&(index, [_, to])| self.end_at(index, to));
         let is_near = |tip: &End| self.ahead(&tip.flat, point).abs() <= tolerance;
-        [first, last].into_iter().flatten().find(is_near)
+        self.tips()?.into_iter().find(is_near)
+    }
+
+    /// The first and the last point.
+    fn tips(&self) -> Option<[End; 2]> {
+        let [(first, [from, _]), (last, [_, to])] = self.ends()?;
+        Some([self.end_at(first, from), self.end_at(last, to)])
     }
 
     /// The crossing of the line with the window, if there is one: on the first piece that ends ahead of the line.
     fn on_piece(&self, point: &Vector2<f64>) -> Option<End> {
         let ahead = |index: usize, at: f64| self.ahead(&self.chain[index].curve.point(at), point);
-        let &(first, [start, _]) = self.pieces.first()?;
-        if ahead(first, start) > 0.0 {
-            return None;
-        }
-        let ends_ahead = |&&(index, [_, to]): &&(usize, [f64; 2])| ahead(index, to) >= 0.0;
-        let &(index, [from, to]) = self.pieces.iter().find(ends_ahead)?;
+        let (index, [from, to]) = self.crossed(ahead)?;
         let fraction = match self.chain[index].curve.circle() {
             None => {
                 let (a, b) = (ahead(index, 0.0), ahead(index, 1.0));
                 if a < 0.0 { a / (a - b) } else { 0.0 }
             }
-            Some(_) => root(|at| ahead(index, at), from, to),
+            Some(_) => {
+                let edge = &self.chain[index];
+                let rate = |at: f64| edge.curve.length() * (edge.direction(at) - self.angle).cos();
+                root(|at| (ahead(index, at), rate(at)), from, to)
+            }
         };
         Some(self.end_at(index, fraction))
     }
 
+    /// The first piece that ends ahead of a line, by the distance of points ahead of it; `None` where the line passes by.
+    fn crossed(&self, ahead: impl Fn(usize, f64) -> f64) -> Option<Facing> {
+        let ends_ahead = |&(index, [_, to]): &Facing| ahead(index, to) >= 0.0;
+        let mut first = None;
+        for piece in self.back() {
+            if !ends_ahead(&piece) {
+                return first.or_else(|| self.forward().find(ends_ahead));
+            }
+            first = Some(piece);
+        }
+        let (index, [from, _]) = first.or_else(|| self.forward().next())?;
+        match ahead(index, from) > 0.0 {
+            true => None,
+            false => first.or_else(|| self.forward().find(ends_ahead)),
+        }
+    }
+
     /// The foot of the perpendicular from the nearer end of the window onto the rib's line.
     fn graze(&self, point: &Vector2<f64>) -> End {
-        let ends = [self.pieces.first(), self.pieces.last()];
-        let nearest = (self.start.min(self.chain.len() - 1), [0.0; 2]);
-        let [first, last] = ends.map(|piece| piece.copied().unwrap_or(nearest));
-        let ends = [
-            self.end_at(first.0, first.1[0]),
-            self.end_at(last.0, last.1[1]),
-        ];
+        let nearest = self.end_at(self.start.min(self.chain.len() - 1), 0.0);
+        let [a, b] = self.tips().unwrap_or([nearest; 2]);
         let gap = |end: &End| self.ahead(&end.flat, point);
-        let [a, b] = ends;
         let nearer = if gap(&a).abs() < gap(&b).abs() { a } else { b };
         End {
             flat: nearer.flat - gap(&nearer) * direction(self.angle),
@@ -443,33 +449,44 @@ impl<'a> Window<'a> {
 fn nearest_piece(chains: &Chains, side: usize, foot: &Foot) -> (usize, bool) {
     let chain = &chains.edges[side];
     let ends = usize::from(chains.is_open);
-    let inner = ends..chain.len() - ends;
+    let inner = &chain[ends..chain.len() - ends];
+    // Along a chain the segments come in order.
+    let own = ends + inner.partition_point(|edge| edge.owner < foot.owner);
+    let after = ends + inner.partition_point(|edge| edge.owner <= foot.owner);
     let distance = |&index: &usize| {
         let edge = &chain[index];
         let (a, b) = (edge.heading, edge.heading + edge.curve.turn());
         let heading = foot.flat.heading;
         (heading - heading.clamp(a.min(b), a.max(b))).abs()
     };
-    let own = inner
-        .clone()
-        .filter(|&index| chain[index].owner == foot.owner);
-    let nearest = own.min_by(|a, b| distance(a).total_cmp(&distance(b)));
-    let after = || inner.clone().find(|&index| chain[index].owner > foot.owner);
+    let nearest = (own..after).min_by(|a, b| distance(a).total_cmp(&distance(b)));
     match nearest {
         Some(index) => (index, true),
-        None => (after().unwrap_or(chain.len() - ends), false),
+        None => (after, false),
     }
 }
 
-/// The root of a rising function between a and b.
-fn root(f: impl Fn(f64) -> f64, mut a: f64, mut b: f64) -> f64 {
-    for _ in 0..64 {
-        let middle = 0.5 * (a + b);
-        if f(middle) < 0.0 {
-            a = middle;
+/// The root of a rising function between a and b, given with its derivative: by Newton's method, or by halving where a step
+/// would leave the bounds.
+fn root(f: impl Fn(f64) -> (f64, f64), mut a: f64, mut b: f64) -> f64 {
+    /// Largest count of steps, a number; halving alone leaves rounding.
+    const STEPS: usize = 64;
+    /// Step of Newton's method of which the square is rounding; in the unit of a and b.
+    const LAST: f64 = 1e-9;
+    let mut at = 0.5 * (a + b);
+    for _ in 0..STEPS {
+        let (value, rate) = f(at);
+        if value < 0.0 {
+            a = at;
         } else {
-            b = middle;
+            b = at;
         }
+        let newton = at - value / rate;
+        let is_inside = a <= newton && newton <= b;
+        if is_inside && (newton - at).abs() <= LAST {
+            return newton;
+        }
+        at = if is_inside { newton } else { 0.5 * (a + b) };
     }
-    0.5 * (a + b)
+    at
 }

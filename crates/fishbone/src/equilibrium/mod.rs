@@ -189,21 +189,40 @@ impl Equilibrium {
     /// The estimated error by the mesh, found by the equilibrium of the mesh of elements half as long; `None` of a solve that
     /// has not converged by a method with multipliers, and where that mesh has no equilibrium next to this one.
     pub fn error(&self) -> Option<MeshError> {
-        *self.error.get_or_init(|| {
-            let solved = match self.certified_any().ok()? {
-                AnySolved::Developable(solved) => solved,
-                AnySolved::Shell(solved) => return shell::error(&self.problem, solved),
-            };
-            let estimate = Estimate::new(
-                &self.problem,
-                &solved.program,
-                &solved.at,
-                solved.values.objective,
-                true,
-                &mut || ControlFlow::Continue(()),
-            );
-            Some(estimate?.error)
-        })
+        self.error_while(&mut || ControlFlow::Continue(()))
+    }
+
+    /// As [`Self::error`]; `proceed` is asked once an iteration whether to go on, and `Break` leaves the error unknown.
+    pub fn error_while(&self, proceed: &mut dyn FnMut() -> ControlFlow<()>) -> Option<MeshError> {
+        if let Some(known) = self.error.get() {
+            return *known;
+        }
+        let mut stopped = false;
+        let estimate = self.estimated_error(&mut || {
+            let answer = proceed();
+            stopped |= answer.is_break();
+            answer
+        });
+        match stopped {
+            true => None,
+            false => *self.error.get_or_init(|| estimate),
+        }
+    }
+
+    fn estimated_error(&self, proceed: &mut dyn FnMut() -> ControlFlow<()>) -> Option<MeshError> {
+        let solved = match self.certified_any().ok()? {
+            AnySolved::Developable(solved) => solved,
+            AnySolved::Shell(solved) => return shell::error(&self.problem, solved, proceed),
+        };
+        let estimate = Estimate::new(
+            &self.problem,
+            &solved.program,
+            &solved.at,
+            solved.values.objective,
+            true,
+            proceed,
+        );
+        Some(estimate?.error)
     }
 
     /// The programme and its solution, from which every other computation starts, if the solve has converged by a method

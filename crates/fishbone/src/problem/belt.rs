@@ -272,7 +272,8 @@ impl Belt {
     /// Every stretch of the belt divided into elements of equal length, of about `count` in all, shared out by length. There
     /// are more where a share is not whole, between two breaks, ends of segments or entries of a table of rigidity.
     pub(crate) fn divided(&self, count: usize, breaks: &[Break]) -> Vec<Division> {
-        let of_length = |stretch: &Stretch| stretch.length() / self.length();
+        let length = self.length();
+        let of_length = |stretch: &Stretch| stretch.length() / length;
         let divided = |stretch: &Stretch| {
             Division::equal(match stretch.segment {
                 Segment::Strip(_) => share(count, of_length(stretch)).max(stretch.fewest()),
@@ -287,8 +288,9 @@ impl Belt {
         let mut pieces = pieces
             .iter()
             .filter(|piece| !matches!(piece, Piece::Joint { .. }));
+        let length = self.length();
         let divided = |stretch: &Stretch| {
-            let whole = stretch.length() / self.length();
+            let whole = stretch.length() / length;
             let (mut done, mut shares) = (0.0, Vec::new());
             while done < whole - SAME_PLACE
                 && let Some(piece) = pieces.next()
@@ -329,9 +331,12 @@ impl Belt {
 
     /// Lengths of the stretches between breaks, ends of segments and entries of tables, in U.
     pub(crate) fn lengths_of_stretches(&self, breaks: &[Break]) -> Vec<f64> {
+        let whole = self.length();
         let stretches = self.stretches(breaks);
-        let lengths = stretches.iter().map(Stretch::length);
-        lengths.map(|length| length / self.length()).collect()
+        stretches
+            .iter()
+            .map(|stretch| stretch.length() / whole)
+            .collect()
     }
 
     fn stretches(&self, breaks: &[Break]) -> Vec<Stretch<'_>> {

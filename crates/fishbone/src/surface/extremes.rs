@@ -206,6 +206,8 @@ const SAMPLES: usize = 8;
 /// a clamp, the curvature of a sheet is far larger, and the model does not know it. `None` also where no part of the board is so
 /// far from clamps.
 pub fn least_bend_radius(spine: &Spine) -> Option<Extreme> {
+    /// Radius at the samples of a part over the least of all beyond which the part has no tighter bend; dimensionless.
+    const FAR: f64 = 2.0;
     if let Some(board) = ThickBoard::of(spine) {
         return board.least_radius();
     }
@@ -214,7 +216,15 @@ pub fn least_bend_radius(spine: &Spine) -> Option<Extreme> {
     let parts = spine
         .strips()
         .flat_map(|element| smooth_parts(spine, &board, element));
-    let bends = parts.map(|part| tightest_in(spine, &board, part));
+    let sampled: Vec<_> = parts
+        .map(|part| (part, tightest_sample(spine, &board, part)))
+        .collect();
+    let values = sampled.iter().map(|(_, sample)| sample.value);
+    let near = FAR * values.fold(f64::INFINITY, f64::min);
+    let tight = sampled
+        .into_iter()
+        .filter(|(_, sample)| sample.value <= near);
+    let bends = tight.map(|(part, sample)| tightest_near(spine, &board, part, sample));
     let least = bends.min_by(|a, b| a.value.total_cmp(&b.value));
     least.filter(|bend| bend.value.is_finite())
 }
@@ -241,13 +251,27 @@ pub(super) fn smooth_parts(spine: &Spine, board: &Board, element: usize) -> Vec<
         .collect()
 }
 
-fn tightest_in(spine: &Spine, board: &Board, part: Part) -> Extreme {
+/// Distance between the samples of a part.
+fn step(part: Part) -> f64 {
+    (part.to - part.from) / SAMPLES as f64
+}
+
+fn sharper(a: Extreme, b: Extreme) -> Extreme {
+    if b.value < a.value { b } else { a }
+}
+
+/// The tightest of the samples of a part.
+fn tightest_sample(spine: &Spine, board: &Board, part: Part) -> Extreme {
     let radius = |distance: f64| tightest_on_rib(spine, board, part.element, distance);
-    let step = (part.to - part.from) / SAMPLES as f64;
-    let samples = (0..=SAMPLES).map(|i| radius(part.from + i as f64 * step));
-    let sharper = |a: Extreme, b: Extreme| if b.value < a.value { b } else { a };
-    let best = samples.fold(radius(part.from), sharper);
+    let samples = (1..=SAMPLES).map(|i| radius(part.from + i as f64 * step(part)));
+    samples.fold(radius(part.from), sharper)
+}
+
+/// The tightest bend of a part about the tightest of its samples.
+fn tightest_near(spine: &Spine, board: &Board, part: Part, best: Extreme) -> Extreme {
+    let radius = |distance: f64| tightest_on_rib(spine, board, part.element, distance);
     let centre = best.u - spine.u[part.element];
+    let step = step(part);
     let (low, high) = ((centre - step).max(part.from), (centre + step).min(part.to));
     sharper(best, radius(golden_section(|x| radius(x).value, low, high)))
 }
@@ -272,13 +296,21 @@ fn tightest_on_rib(spine: &Spine, board: &Board, element: usize, distance: f64) 
 
 /// The minimiser of a function with one valley between a and b.
 fn golden_section(f: impl Fn(f64) -> f64, mut a: f64, mut b: f64) -> f64 {
+    /// Count of cuts, a number: what is left is the square root of rounding, which the value at a valley does not show.
+    const CUTS: usize = 40;
     let ratio = 0.5 * (5f64.sqrt() - 1.0);
-    for _ in 0..50 {
-        let (left, right) = (b - ratio * (b - a), a + ratio * (b - a));
-        if f(left) < f(right) {
-            b = right;
+    let inner = |a: f64, b: f64| [b - ratio * (b - a), a + ratio * (b - a)];
+    let [mut left, mut right] = inner(a, b);
+    let (mut at_left, mut at_right) = (f(left), f(right));
+    for _ in 0..CUTS {
+        if at_left < at_right {
+            (b, right, at_right) = (right, left, at_left);
+            left = inner(a, b)[0];
+            at_left = f(left);
         } else {
-            a = left;
+            (a, left, at_left) = (left, right, at_right);
+            right = inner(a, b)[1];
+            at_right = f(right);
         }
     }
     0.5 * (a + b)

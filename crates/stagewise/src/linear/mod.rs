@@ -14,7 +14,7 @@ mod symmetries;
 
 pub use inertia::Inertia;
 pub(crate) use kkt::Kkt;
-pub use modes::{Mode, lowest_modes, moved};
+pub use modes::{Mode, lowest_modes, lowest_modes_while, moved};
 pub use pair_matrix::{PairMatrix, StageMatrix};
 pub use rank::redundant_equalities;
 pub use response::{Direction, Response, Singular};

@@ -278,14 +278,21 @@ impl<const X: usize, const U: usize, const N: usize> Response<X, U, N> {
     ///
     /// Errors: [`Singular`] as [`Self::solve`].
     pub(super) fn answers(&mut self, forces: &Motions<N>) -> Result<Motions<N>, Singular> {
-        let mut answer = |force: &Vec<NodeVector<N>>| {
-            let mut right = self.zero();
-            for (right, force) in right.nodes.iter_mut().zip(force) {
-                *right = -force;
-            }
-            Ok(self.solve(&right)?.nodes)
-        };
-        forces.iter().map(&mut answer).collect()
+        forces.iter().map(|force| self.answer(force)).collect()
+    }
+
+    /// The motion that answers a force.
+    ///
+    /// Errors: [`Singular`] as [`Self::solve`].
+    pub(super) fn answer(
+        &mut self,
+        force: &[NodeVector<N>],
+    ) -> Result<Vec<NodeVector<N>>, Singular> {
+        let mut right = self.zero();
+        for (right, force) in right.nodes.iter_mut().zip(force) {
+            *right = -force;
+        }
+        Ok(self.solve(&right)?.nodes)
     }
 
     /// Solves a system that may be nearly singular, for an approximation that a later iteration corrects.

@@ -173,9 +173,12 @@ fn hidden(problem: &Problem) -> String {
 }
 
 /// The estimated error of a solution by its mesh: its change on halving all elements.
-pub(super) fn error(problem: &Problem, solved: &Solved<Shell, FIELDS, 12>) -> Option<MeshError> {
+pub(super) fn error(
+    problem: &Problem,
+    solved: &Solved<Shell, FIELDS, 12>,
+    proceed: &mut Proceed,
+) -> Option<MeshError> {
     let solution = assess(&solved.program, problem.tolerance(), &solved.at);
-    let proceed: &mut Proceed = &mut || ControlFlow::Continue(());
     let (finer, better) = halved(problem, &solved.program, &solution, proceed)?;
     let error = change(problem, (&solved.program, &solution), (&finer, &better));
     error.is_finite().then_some(error)

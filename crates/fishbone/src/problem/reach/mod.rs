@@ -48,13 +48,15 @@ impl fmt::Display for OutOfReach {
 impl Problem {
     /// The first two points that are held too far apart for the belt between them; `None` where there are none.
     pub(crate) fn unreachable_supports(&self) -> Option<OutOfReach> {
-        let spans = Span::all(&self.scenario);
-        let span = spans.into_iter().find(Span::is_too_long)?;
+        let points = HeldPoint::all(&self.scenario);
+        let too_long = Span::all(&points, &self.scenario).filter(Span::is_too_long);
+        // The shorter the span, the nearer its name is to the fault.
+        let span = too_long.min_by(|a, b| a.belt.total_cmp(&b.belt))?;
         Some(OutOfReach {
             distance: span.distance(),
             closer: span.closer(),
             belt: span.belt,
-            held: span.held,
+            held: span.held.to_string(),
         })
     }
 
@@ -63,8 +65,8 @@ impl Problem {
     pub(crate) fn has_no_slack(&self) -> bool {
         /// Slack of the belt between two held points below which reactions are undetermined, as a share of its length.
         const SLACK: f64 = 1e-6;
-        let spans = Span::all(&self.scenario);
-        let mut spans = spans.iter().filter(|span| span.belt > 0.0);
+        let points = HeldPoint::all(&self.scenario);
+        let mut spans = Span::all(&points, &self.scenario).filter(|span| span.belt > 0.0);
         spans.any(|span| span.excess() > -SLACK * span.belt)
     }
 }
@@ -82,6 +84,14 @@ struct HeldPoint {
 }
 
 impl HeldPoint {
+    /// The points that the supports of a scenario hold.
+    fn all(scenario: &Scenario) -> Vec<Self> {
+        let supports = scenario.supports.iter().enumerate();
+        supports
+            .flat_map(|support| Self::of(support, scenario))
+            .collect()
+    }
+
     /// The points that a support holds: of the spine and, where it holds the rib, the rib's two ends; the same at the ends of
     /// the stiffener that a clamp holds.
     fn of((i, support): (usize, &SupportSpec), scenario: &Scenario) -> Vec<Self> {
@@ -136,8 +146,7 @@ impl HeldPoint {
 
 /// Two points of the belt that are held at a distance from each other.
 struct Span {
-    /// The supports or the link that hold the two points, and their places.
-    held: String,
+    held: Held,
     /// Vector between the places of the spine, along the axes on which both are held.
     chord: Vector3<f64>,
     /// Difference of the points' offsets from these places, along the same axes.
@@ -148,28 +157,53 @@ struct Span {
     rounding: f64,
 }
 
+/// What holds the two points of a span.
+enum Held {
+    Supports([HeldPoint; 2]),
+    /// A link by its index, and the arc lengths of its ends.
+    Link(usize, [f64; 2]),
+    /// Two supports by way of a link, by its index.
+    SupportsByLink([HeldPoint; 2], usize),
+}
+
+impl fmt::Display for Held {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Supports([a, b]) => {
+                let [at_a, at_b] = [a, b].map(HeldPoint::place);
+                write!(f, "{} and {}, at {at_a} and {at_b},", a.name(), b.name())
+            }
+            Self::Link(i, ends) => {
+                let [from, to] = ends.map(number);
+                write!(f, "the ends of links[{i}], at u = {from} and u = {to},")
+            }
+            Self::SupportsByLink([a, b], i) => {
+                let (a, b) = (a.name(), b.name());
+                write!(
+                    f,
+                    "{a} and {b}, less the offset of links[{i}] between them,"
+                )
+            }
+        }
+    }
+}
+
 impl Span {
     /// The spans between the points that supports hold, between the ends of links, and from support to support by way of a
     /// link.
-    fn all(scenario: &Scenario) -> Vec<Self> {
-        let supports = scenario.supports.iter().enumerate();
-        let points: Vec<_> = supports
-            .flat_map(|support| HeldPoint::of(support, scenario))
-            .collect();
-        let pairs = || {
+    fn all<'a>(points: &'a [HeldPoint], scenario: &'a Scenario) -> impl Iterator<Item = Self> + 'a {
+        let pairs = move || {
             let first = points.iter().enumerate();
             first.flat_map(|(i, a)| points[i + 1..].iter().map(move |b| [*a, *b]))
         };
-        let pairs = || pairs().filter(|[a, b]| a.support != b.support);
+        let pairs = move || pairs().filter(|[a, b]| a.support != b.support);
         let links = || scenario.links.iter().enumerate();
         let between = pairs().map(|pair| Self::between(pair, scenario));
         let of_links = links().map(|link| Self::of_link(link, scenario));
-        let by_links = links()
-            .flat_map(|link| pairs().flat_map(move |pair| Self::by_way_of(link, pair, scenario)));
-        let mut spans: Vec<_> = between.chain(of_links).chain(by_links).collect();
-        // The shorter the span, the nearer its name is to the fault.
-        spans.sort_by(|a, b| a.belt.total_cmp(&b.belt));
-        spans
+        let by_links = links().flat_map(move |link| {
+            pairs().flat_map(move |pair| Self::by_way_of(link, pair, scenario))
+        });
+        between.chain(of_links).chain(by_links)
     }
 
     /// The span between two held points, along the axes that both hold.
@@ -181,13 +215,7 @@ impl Span {
         };
         let size = along(&|_, (a, b)| a.abs().max(b.abs())).amax();
         Self {
-            held: format!(
-                "{} and {}, at {} and {},",
-                a.name(),
-                b.name(),
-                a.place(),
-                b.place()
-            ),
+            held: Held::Supports([a, b]),
             chord: along(&|_, (a, b)| b - a),
             across: along(&|k, _| b.across[k] - a.across[k]),
             belt: distance([a, b].map(|point| point.on_board), &scenario.belt),
@@ -198,9 +226,8 @@ impl Span {
     /// The span between the ends of a link.
     fn of_link((i, link): (usize, &LinkSpec), scenario: &Scenario) -> Self {
         let ends = ends(link, scenario);
-        let [from, to] = ends.map(|end| number(end.u));
         Self {
-            held: format!("the ends of links[{i}], at u = {from} and u = {to},"),
+            held: Held::Link(i, ends.map(|end| end.u)),
             chord: link.offset.into(),
             across: Vector3::zeros(),
             belt: distance(ends, &scenario.belt),
@@ -214,26 +241,22 @@ impl Span {
         (i, link): (usize, &LinkSpec),
         [a, b]: [HeldPoint; 2],
         scenario: &Scenario,
-    ) -> Vec<Self> {
+    ) -> impl Iterator<Item = Self> {
         let Some((first, second)) = a.point().zip(b.point()) else {
-            return Vec::new();
+            return None.into_iter().flatten();
         };
         let ends = ends(link, scenario);
         let offset = Vector3::from(link.offset);
         let senses = [(ends, offset), ([ends[1], ends[0]], -offset)];
         let span = |([near, far], offset): ([BoardPoint; 2], Vector3<f64>)| Self {
-            held: format!(
-                "{} and {}, less the offset of links[{i}] between them,",
-                a.name(),
-                b.name()
-            ),
+            held: Held::SupportsByLink([a, b], i),
             chord: second - first - offset,
             across: b.across - a.across,
             belt: distance([a.on_board, near], &scenario.belt)
                 + distance([far, b.on_board], &scenario.belt),
             rounding: rounding(scenario, first.amax().max(second.amax())),
         };
-        senses.map(span).into()
+        Some(senses.map(span)).into_iter().flatten()
     }
 
     fn distance(&self) -> f64 {

@@ -23,6 +23,8 @@ const MOST_TURNS: f64 = 1000.0;
 const HALF_TURNS: RangeInclusive<i32> = -20..=20;
 /// Greatest count of layers, a number.
 const MOST_LAYERS: usize = 1000;
+/// Greatest count of segments, a number.
+const MOST_SEGMENTS: usize = 10_000;
 /// Greatest count of a table's entries, a number.
 const MOST_ENTRIES: usize = 10_000;
 
@@ -58,6 +60,7 @@ impl BeltSpec {
         require(!self.segments.is_empty(), field, || {
             ("an empty array", "at least one segment")
         })?;
+        at_most(field, self.segments.len(), MOST_SEGMENTS, "segments")?;
         for (i, segment) in self.segments.iter().enumerate() {
             segment.check(i)?;
         }

@@ -15,6 +15,8 @@ const LARGEST_ANGLE: f64 = 1e6;
 /// Greatest count of links, a number: they couple all nodes between their ends, and the work grows with the square of the
 /// count.
 const MOST_LINKS: usize = 100;
+/// Greatest count of supports, a number: the work grows with the square of the count.
+const MOST_SUPPORTS: usize = 100;
 /// Greatest count of point loads, a number.
 const MOST_LOADS: usize = 10_000;
 
@@ -49,6 +51,8 @@ impl Extent {
 }
 
 pub(super) fn check_supports(supports: &[SupportSpec], extent: Extent) -> Check {
+    let field = format_args!("supports");
+    at_most(field, supports.len(), MOST_SUPPORTS, "supports")?;
     for (i, support) in supports.iter().enumerate() {
         support.check(i, extent)?;
     }
