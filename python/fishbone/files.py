@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
 
@@ -29,16 +31,26 @@ def check_writable(path: Path, suffixes: tuple[str, ...]) -> str | None:
     return None
 
 
-def write_whole(path: Path, content: bytes) -> None:
-    """Writes a draft beside the file and moves the draft to its place, so that no reader sees a part of the file.
+@contextlib.contextmanager
+def whole(path: Path) -> Iterator[Path]:
+    """A draft beside the file, which the body writes; it is moved to its place after the body.
 
-    Errors: `OSError`; the file is then as it was before.
+    No reader sees a part of the file. Errors: `OSError` and those of the body; the file is then as it was before.
     """
     # A symbolic link stays a link: its target is replaced.
     target = path.resolve()
     draft = target.with_name(f".{target.name}.{os.getpid()}.part")
     try:
-        draft.write_bytes(content)
+        yield draft
         draft.replace(target)
     finally:
         draft.unlink(missing_ok=True)
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Writes a file, so that no reader sees a part of it.
+
+    Errors: `OSError`; the file is then as it was before.
+    """
+    with whole(path) as draft:
+        draft.write_bytes(content)

@@ -1,0 +1,91 @@
+"""The processes that solve the points of a sweep, as a Dask cluster: here, or wherever its scheduler is."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import logging
+from typing import TYPE_CHECKING, Any
+
+from fishbone.errors import FishboneError, InvalidArgument
+from fishbone.sweep.extra import extra
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator
+
+AHEAD = 500
+"""Greatest number of tasks that wait or run at a time."""
+PATIENCE = "10s"
+"""Time after which a scheduler that does not answer is given up."""
+
+
+def results(
+    scheduler: str | None, task: Callable[..., Any], arguments: Iterable[tuple[Any, ...]], count: int, **keywords: object
+) -> Iterator[Any]:
+    """The results of a task for each of its `count` arguments, in the order in which they are done.
+
+    A task whose worker is lost is done anew by another one. `scheduler` is the address of a Dask scheduler; None is a
+    cluster of processes on this machine, one for each core.
+
+    Errors: `MissingPackage`; `InvalidArgument` where there is no such scheduler, or its workers cannot do the task;
+    `FishboneError` where the scheduler is lost, or worker after worker with a task; those of the task.
+    """
+    if count == 0:
+        return
+    distributed = extra("distributed")
+    try:
+        with _client(scheduler, count) as client:
+            yield from _collected(client, task, arguments, keywords)
+    except ImportError as error:
+        raise InvalidArgument(f"scheduler: found workers without a package ({error}), allowed those with all") from None
+    except distributed.scheduler.KilledWorker as error:
+        raise FishboneError(f"workers: found {error.allowed_failures + 1} lost in a row with the same points") from None
+    except (distributed.CancelledError, distributed.comm.CommClosedError):
+        raise FishboneError(f"scheduler: found the connection to {scheduler} lost; start again to go on") from None
+
+
+def _collected(
+    client: Any,  # noqa: ANN401 - of dask
+    task: Callable[..., Any],
+    arguments: Iterable[tuple[Any, ...]],
+    keywords: dict[str, object],
+) -> Iterator[Any]:
+    waiting = iter(arguments)
+
+    def submitted(count: int) -> list[Any]:
+        return [client.submit(task, *some, pure=False, **keywords) for some in itertools.islice(waiting, count)]
+
+    running = extra("distributed").as_completed(submitted(AHEAD), loop=client.loop, with_results=True)
+    for _, result in running:
+        yield result
+        running.update(submitted(1))
+
+
+@contextlib.contextmanager
+def _client(scheduler: str | None, tasks: int) -> Iterator[Any]:
+    """The client of a scheduler, or of processes of its own, no more than there are tasks."""
+    distributed = extra("distributed")
+    if scheduler is not None:
+        with _connected(scheduler) as client:
+            yield client
+        return
+    # One thread each: a solve holds no lock of Python for long, but the rows do.
+    cluster = distributed.LocalCluster(
+        n_workers=min(extra("dask.system").CPU_COUNT, tasks),
+        threads_per_worker=1,
+        processes=True,
+        dashboard_address=None,
+        silence_logs=logging.CRITICAL,
+    )
+    with cluster, distributed.Client(cluster, set_as_default=False) as client:
+        yield client
+
+
+def _connected(scheduler: str) -> Any:  # noqa: ANN401 - of dask
+    try:
+        return extra("distributed").Client(scheduler, timeout=PATIENCE, set_as_default=False)
+    except (OSError, ValueError) as error:
+        text = " ".join(str(error).split())
+        raise InvalidArgument(
+            f"scheduler: found {scheduler!r} ({text}), allowed the address of a Dask scheduler, as in tcp://host:8786"
+        ) from None
