@@ -521,3 +521,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _fail(exit_code: int, message: str) -> int:
     click.echo(f"fishbone: {' '.join(message.split())}", err=True)
     return exit_code
+
+
+from fishbone import sweep_command  # noqa: E402, F401 - it adds its command, with what stands above

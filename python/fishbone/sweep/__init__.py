@@ -138,9 +138,9 @@ def sweep(  # noqa: PLR0913 - keywords all but three
     points = points_of(scenario, ranges, tolerances or {}, sample, seed)
     tables = scenario.to_dict()
     parts = Parts(target, _manifest(tables, points, shapes=shapes))
-    size = min(LARGEST_PART, math.ceil(points.count / PARTS))
-    firsts = [first for first in range(0, points.count, size) if not (parts.is_finished or parts.has(first))]
-    lengths = {first: min(size, points.count - first) for first in firsts}
+    size = min(LARGEST_PART, math.ceil(points.total / PARTS))
+    firsts = [first for first in range(0, points.total, size) if not (parts.is_finished or parts.has(first))]
+    lengths = {first: min(size, points.total - first) for first in firsts}
     numbers = {field: number_of(scenario, field) for field in points.fields}
     tasks = ((tables, numbers, first, points.values(first, first + length)) for first, length in lengths.items())
     solved, planned = 0, sum(lengths.values())

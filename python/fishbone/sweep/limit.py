@@ -6,9 +6,9 @@ import re
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from fishbone.errors import InvalidArgument
-from fishbone.units import SI
 
 if TYPE_CHECKING:
+    import numpy as np
     from numpy.typing import NDArray
 
     from fishbone.scenario import Scenario
@@ -60,6 +60,11 @@ def limit_of(scenario: Scenario, text: str) -> Limit:
             f"limit: found {text!r}, allowed a figure, < or > and a number, as in bend_radius.area.p99>0.002"
         ) from None
     return Limit(column, "<" if sign == "<" else ">", value * _factor(scenario, column, unit))
+
+
+def describe_yield(passing: NDArray[np.bool_], limit: str) -> str:
+    """The share of the points that are within a limit, in words."""
+    return f"yield {passing.mean():.2%}, {passing.sum()} of {len(passing)} points converged with {limit}"
 
 
 def quantity_of(column: str) -> Quantity | None:

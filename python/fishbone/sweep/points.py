@@ -55,7 +55,7 @@ class Grid(NamedTuple):
     """First number, last number and count of each field."""
 
     @property
-    def count(self) -> int:
+    def total(self) -> int:
         """Number of points."""
         return math.prod(count for _, _, count in self.axes)
 
@@ -69,7 +69,7 @@ class Grid(NamedTuple):
 
         Shapes: (points, fields).
         """
-        places = np.unravel_index(np.arange(first, min(last, self.count)), [count for _, _, count in self.axes])
+        places = np.unravel_index(np.arange(first, min(last, self.total)), [count for _, _, count in self.axes])
         return np.column_stack([_along(axis, place) for axis, place in zip(self.axes, places, strict=True)])
 
 
@@ -81,7 +81,7 @@ class Sample(NamedTuple):
     """The numbers of the points, shape (count, fields)."""
 
     @property
-    def count(self) -> int:
+    def total(self) -> int:
         """Number of points."""
         return len(self.drawn)
 
@@ -89,7 +89,7 @@ class Sample(NamedTuple):
     def design(self) -> dict[str, Any]:
         """All that determines the points, as plain data: a digest, which the random generator's version is part of."""
         digest = hashlib.sha256(np.ascontiguousarray(self.drawn, dtype="<f8").tobytes())
-        return {"fields": list(self.fields), "count": self.count, "sha256": digest.hexdigest()}
+        return {"fields": list(self.fields), "count": self.total, "sha256": digest.hexdigest()}
 
     def values(self, first: int, last: int) -> Floats:
         """The points from number `first` to before number `last`, or to the end.
@@ -162,8 +162,8 @@ def _grid(ranges: Mapping[str, Sequence[float]]) -> Grid:
             raise InvalidArgument(f"{field}: found {count:g} values, allowed a whole number from 1")
         axes.append((start, stop, int(count)))
     grid = Grid(tuple(ranges), tuple(axes))
-    if grid.count > MAX_POINTS:
-        raise InvalidArgument(f"sweep: found {grid.count} points, allowed up to {MAX_POINTS}")
+    if grid.total > MAX_POINTS:
+        raise InvalidArgument(f"sweep: found {grid.total} points, allowed up to {MAX_POINTS}")
     return grid
 
 

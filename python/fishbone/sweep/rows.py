@@ -84,7 +84,9 @@ def flatten(name: str, value: Any) -> Iterator[tuple[str, Any]]:  # noqa: ANN401
 
 
 def _is_vector(value: Any) -> bool:  # noqa: ANN401 - plain data
-    return isinstance(value, list) and len(value) == len("xyz") and all(x is None or isinstance(x, float) for x in value)
+    return (
+        isinstance(value, list) and len(value) == len("xyz") and all(x is None or isinstance(x, float) for x in value)
+    )
 
 
 def _encode(rows: list[Row]) -> bytes:

@@ -20,7 +20,11 @@ PATIENCE = "10s"
 
 
 def results(
-    scheduler: str | None, task: Callable[..., Any], arguments: Iterable[tuple[Any, ...]], count: int, **keywords: object
+    scheduler: str | None,
+    task: Callable[..., Any],
+    arguments: Iterable[tuple[Any, ...]],
+    count: int,
+    **keywords: object,
 ) -> Iterator[Any]:
     """The results of a task for each of its `count` arguments, in the order in which they are done.
 
