@@ -96,7 +96,9 @@ def _check(path: Path, found: Manifest | None, manifest: Manifest) -> None:
         raise InvalidArgument(f"{path}: found a file that is no table of a sweep, allowed a new file")
     for name, value in manifest.items():
         if found.get(name) != value:
-            raise InvalidArgument(f"{path}: found a sweep of another {name}, allowed the same sweep or a new file")
+            raise InvalidArgument(
+                f"{path}: found a sweep that differs in its {name}, allowed the same sweep or a new file"
+            )
 
 
 def _unified(schemas: list[Any]) -> Any:  # noqa: ANN401 - a schema of pyarrow

@@ -56,7 +56,7 @@ def draw(found: Sweep, limit: str | None) -> Figure:
         if limit is None
         else describe_yield(found.passes(limit), limit)
     )
-    figure.suptitle(f"{name}: {outcome}", fontsize=10.0, parse_math=False)
+    figure.suptitle(f"{name}\n{outcome}", fontsize=10.0, parse_math=False)
     return figure
 
 

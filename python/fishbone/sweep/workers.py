@@ -78,7 +78,9 @@ def _client(scheduler: str | None, tasks: int) -> Iterator[Any]:
         n_workers=min(extra("dask.system").CPU_COUNT, tasks),
         threads_per_worker=1,
         processes=True,
-        dashboard_address=None,
+        # No page that shows the cluster; its server is there all the same, for this machine alone, at any free port.
+        dashboard_address="127.0.0.1:0",
+        scheduler_kwargs={"dashboard": False},
         silence_logs=logging.CRITICAL,
     )
     with cluster, distributed.Client(cluster, set_as_default=False) as client:
