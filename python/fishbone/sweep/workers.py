@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import logging
+import signal
 from typing import TYPE_CHECKING, Any
 
 from fishbone.errors import FishboneError, InvalidArgument
@@ -73,18 +74,38 @@ def _client(scheduler: str | None, tasks: int) -> Iterator[Any]:
         with _connected(scheduler) as client:
             yield client
         return
-    # One thread each: a solve holds no lock of Python for long, but the rows do.
-    cluster = distributed.LocalCluster(
-        n_workers=min(extra("dask.system").CPU_COUNT, tasks),
-        threads_per_worker=1,
-        processes=True,
-        # No page that shows the cluster; its server is there all the same, for this machine alone, at any free port.
-        dashboard_address="127.0.0.1:0",
-        scheduler_kwargs={"dashboard": False},
-        silence_logs=logging.CRITICAL,
-    )
+    with _without_interrupts():
+        cluster = distributed.LocalCluster(
+            n_workers=min(extra("dask.system").CPU_COUNT, tasks),
+            threads_per_worker=1,
+            processes=True,
+            # A server at any free port, for this machine alone; without a page.
+            dashboard_address="127.0.0.1:0",
+            scheduler_kwargs={"dashboard": False},
+            silence_logs=logging.CRITICAL,
+        )
     with cluster, distributed.Client(cluster, set_as_default=False) as client:
         yield client
+
+
+@contextlib.contextmanager
+def _without_interrupts() -> Iterator[None]:
+    """Holds Ctrl-C back until after the body.
+
+    Processes that the body starts, or later its threads, never get it: it is for this one, which then ends them.
+    """
+    if not hasattr(signal, "pthread_sigmask"):  # on Windows
+        yield
+        return
+    from multiprocessing import resource_tracker  # noqa: PLC0415 - not on Windows
+
+    # Where it is started later, it lets the signals of that thread through again.
+    resource_tracker.ensure_running()
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
 
 
 def _connected(scheduler: str) -> Any:  # noqa: ANN401 - of dask
