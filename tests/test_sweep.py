@@ -5,6 +5,7 @@ One cluster of two processes serves most tests, by its address; a few start proc
 
 from __future__ import annotations
 
+import importlib
 import itertools
 import json
 import math
@@ -15,6 +16,7 @@ import sys
 import time
 from pathlib import Path
 
+import dask
 import distributed
 import numpy as np
 import psutil
@@ -104,6 +106,12 @@ def at(scenario, values):
 
 def rows_of(path):
     return pq.ParquetFile(path).read().to_pylist()
+
+
+def spawned():
+    """The processes of clusters that this one has started."""
+    children = psutil.Process().children(recursive=True)
+    return [one for one in children if "multiprocessing.spawn" in " ".join(one.cmdline())]
 
 
 # ---------------------------------------------------------------------------------------------------- the points
@@ -203,7 +211,9 @@ def test_rows_do_not_depend_on_the_division_into_parts(belt, tmp_path):
     def rows(*bounds):
         found = []
         for first, last in itertools.pairwise(bounds):
-            number, content = solve_part(belt.to_dict(), numbers, first, points.values(first, last), shapes=False)
+            number, content = solve_part(
+                belt.to_dict(), numbers, first, points.values(first, last), shapes=False, version=fb.__version__
+            )
             assert number == first
             (tmp_path / "part.parquet").write_bytes(content)
             found += [
@@ -236,7 +246,7 @@ def test_shapes_are_lists(belt, scheduler, tmp_path):
 
 
 def test_a_column_that_is_not_there_is_named_with_the_nearest(swept):
-    with pytest.raises(fb.InvalidArgument, match=r"bend_radius.area.p9: found no such column .* bend_radius.area.p9"):
+    with pytest.raises(fb.InvalidArgument, match=r"bend_radius.area.p9: found no such column, .* bend_radius.area.p9"):
         swept.column("bend_radius.area.p9")
 
 
@@ -244,12 +254,11 @@ def test_a_column_that_is_not_there_is_named_with_the_nearest(swept):
 
 
 def test_the_table_is_the_same_where_a_worker_is_lost_and_a_second_start_solves_nothing(belt, swept, tmp_path):
-    lost = []
+    lost, others = [], spawned()
 
     def lose(solved, planned):
         if not lost and 0 < solved < planned:
-            children = psutil.Process().children(recursive=True)
-            lost.append(next(one for one in children if "multiprocessing.spawn" in " ".join(one.cmdline())))
+            lost.append(next(one for one in spawned() if one not in others))
             lost[0].kill()
 
     found = fb.sweep(belt, tmp_path / "a.parquet", GRID, progress=lose)
@@ -318,6 +327,36 @@ def test_a_scheduler_that_does_not_answer_is_named(belt, tmp_path, monkeypatch, 
     monkeypatch.setattr(workers, "PATIENCE", "1s")
     with pytest.raises(fb.InvalidArgument, match=f"scheduler: found '{address}' .*tcp://host:8786"):
         fb.sweep(belt, tmp_path / "a.parquet", GRID, scheduler=address)
+
+
+def test_a_worker_of_another_version_is_refused(belt):
+    number = {Y: number_of(belt, Y)}
+    with pytest.raises(fb.InvalidArgument, match=f"found a worker with fishbone {fb.__version__}, allowed 0.0.1"):
+        solve_part(belt.to_dict(), number, 0, np.array([[0.5]]), shapes=False, version="0.0.1")
+
+
+def test_workers_without_a_package_are_named(scheduler):
+    found = workers.results(scheduler, importlib.import_module, [("no_such_package",)], 1, {})
+    with pytest.raises(
+        fb.InvalidArgument, match=r"found workers without a package \(No module named 'no_such_package'\)"
+    ):
+        list(found)
+
+
+def test_workers_that_are_lost_with_the_same_points_end_a_sweep(belt, tmp_path):
+    others = spawned()
+
+    def lose(solved, planned):
+        for one in spawned():
+            if one not in others:
+                one.kill()
+
+    with (
+        dask.config.set({"distributed.scheduler.allowed-failures": 0}),
+        pytest.raises(fb.FishboneError, match="workers: found 1 lost in a row with the same points"),
+    ):
+        fb.sweep(belt, tmp_path / "a.parquet", GRID, progress=lose)
+    assert list((tmp_path / "a.parquet.parts").glob("*.parquet"))
 
 
 # ----------------------------------------------------------------------------------------------------- the yield
@@ -421,6 +460,10 @@ def test_no_point_that_converges_ends_the_command_with_3(run, belt_file):
         (("--set", "belt.width=1:2:3", "--set", "belt.width=1:2:3"), "found belt.width twice"),
         (("--tolerance", "belt.width=0.01", "--sample", "3"), "found belt.width=0.01, allowed ± and a number"),
         (("--set", "belt.width=1:2:3", "--limit", "energy"), "limit: found 'energy'"),
+        (
+            ("--set", "belt.width=1:2:3", "--limit", "enrgy<1"),
+            "enrgy: found no such column, allowed those of the table",
+        ),
         (("--set", "belt.width=1:2:3", "--figure", "a.txt"), "found .txt"),
         (("--set", "belt.width=1:2:3", "--set", f"{Y}=1:2:3", "--set", f"{Z}=1:2:3", "--figure", "a.png"), "3 fields"),
     ],

@@ -11,10 +11,11 @@ import fishbone
 from fishbone.cli import _PATH, Invalid, NoEquilibrium, _output, _write, command
 from fishbone.progress import progress
 from fishbone.sweep import SUFFIX
-from fishbone.sweep.limit import describe_yield, limit_of
+from fishbone.sweep.limit import check_column, describe_yield, limit_of
+from fishbone.sweep.rows import figures_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Collection, Sequence
     from pathlib import Path
 
 _PLUS_MINUS = re.compile(r"(?:±|\+-)\s*(.*)")
@@ -83,7 +84,7 @@ def sweep(  # noqa: PLR0913 - one for each option
         check_fields(list(spans | distances))
     scenario = fishbone.load(file)
     if limit is not None:
-        limit_of(scenario, limit)
+        _check_limit(scenario, limit, spans | distances)
     with progress("sweeping") as state:
         found = fishbone.sweep(
             scenario,
@@ -105,6 +106,15 @@ def sweep(  # noqa: PLR0913 - one for each option
         click.echo(describe_yield(found.passes(limit), limit))
     if "converged" not in found.statuses:
         raise NoEquilibrium(f"{file}: found no point that converged; {out} has the message of each")
+
+
+def _check_limit(scenario: fishbone.Scenario, limit: str, fields: Collection[str]) -> None:
+    """Refuses a limit to a column that the table would not have, as far as the scenario's own result has all."""
+    column = limit_of(scenario, limit).column
+    with progress("solving"):
+        figures = figures_of(scenario.to_dict(), shapes=False)
+    if figures["status"] == "converged":
+        check_column(column, [*figures, *fields])
 
 
 def _fields(option: str, texts: Sequence[str], number: Callable[[str, str], Any]) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import difflib
+import contextlib
 import math
 from collections import Counter
 from pathlib import Path
@@ -13,11 +13,10 @@ import numpy as np
 from fishbone import _core
 from fishbone.errors import InvalidArgument
 from fishbone.files import check_writable
-from fishbone.scenario import Scenario
 from fishbone.sweep.extra import extra
-from fishbone.sweep.limit import limit_of
-from fishbone.sweep.parts import Parts, manifest_of
-from fishbone.sweep.points import number_of, points_of
+from fishbone.sweep.limit import check_column, limit_of
+from fishbone.sweep.parts import Parts
+from fishbone.sweep.points import Grid, number_of, points_of
 from fishbone.sweep.rows import solve_part
 from fishbone.sweep.workers import results
 
@@ -27,6 +26,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from fishbone.scenario import Scenario
     from fishbone.sweep.points import Points
 
 SCHEMA = "fishbone.sweep/1"
@@ -43,15 +43,14 @@ class Sweep:
     Units: those of the scenario.
     """
 
-    def __init__(self, path: Path, solved: int) -> None:
-        manifest = manifest_of(path) or {}
+    def __init__(self, path: Path, scenario: Scenario, points: Points, solved: int) -> None:
         self.path = path
         """The file."""
-        self.scenario = Scenario.from_dict(manifest["scenario"])
+        self.scenario = scenario
         """The scenario whose numbers are swept."""
-        self.fields: tuple[str, ...] = tuple(manifest["points"]["fields"])
+        self.fields = points.fields
         """The fields that are swept, each a column of the same name."""
-        self.is_grid: bool = "axes" in manifest["points"]
+        self.is_grid = isinstance(points, Grid)
         """Whether the points are a grid, not a sample."""
         self.solved = solved
         """Number of points that `sweep` has solved for it; the others were in the file or in its parts."""
@@ -69,9 +68,7 @@ class Sweep:
         Shapes: (points,).
         Errors: `InvalidArgument` where there is no such column.
         """
-        if name not in self.names:
-            nearest = difflib.get_close_matches(name, self.names, n=1, cutoff=0.0)
-            raise InvalidArgument(f"{name}: found no such column in {self.path}, allowed those it has, as {nearest[0]}")
+        check_column(name, self.names)
         table = extra("pyarrow.parquet").ParquetFile(self.path).read(columns=[name])
         values: NDArray[Any] = table[name].to_numpy()
         return values
@@ -144,13 +141,15 @@ def sweep(  # noqa: PLR0913 - keywords all but three
     numbers = {field: number_of(scenario, field) for field in points.fields}
     tasks = ((tables, numbers, first, points.values(first, first + length)) for first, length in lengths.items())
     solved, planned = 0, sum(lengths.values())
-    for first, content in results(scheduler, solve_part, tasks, len(lengths), shapes=shapes):
-        parts.add(first, content)
-        solved += lengths[first]
-        if progress is not None:
-            progress(solved, planned)
+    common = {"shapes": shapes, "version": _core.__version__}
+    with contextlib.closing(results(scheduler, solve_part, tasks, len(lengths), common)) as found:
+        for first, content in found:
+            parts.add(first, content)
+            solved += lengths[first]
+            if progress is not None:
+                progress(solved, planned)
     parts.finish()
-    return Sweep(target, solved)
+    return Sweep(target, scenario, points, solved)
 
 
 def _manifest(tables: dict[str, Any], points: Points, *, shapes: bool) -> dict[str, Any]:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import difflib
 import re
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from fishbone.errors import InvalidArgument
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     import numpy as np
     from numpy.typing import NDArray
 
@@ -60,6 +63,16 @@ def limit_of(scenario: Scenario, text: str) -> Limit:
             f"limit: found {text!r}, allowed a figure, < or > and a number, as in bend_radius.area.p99>0.002"
         ) from None
     return Limit(column, "<" if sign == "<" else ">", value * _factor(scenario, column, unit))
+
+
+def check_column(name: str, names: Collection[str]) -> None:
+    """Refuses a column that is not one of a table.
+
+    Errors: `InvalidArgument`, with the nearest of the names.
+    """
+    if name not in names:
+        [nearest] = difflib.get_close_matches(name, names, n=1, cutoff=0.0)
+        raise InvalidArgument(f"{name}: found no such column, allowed those of the table, as {nearest}")
 
 
 def describe_yield(passing: NDArray[np.bool_], limit: str) -> str:

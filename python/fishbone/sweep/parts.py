@@ -37,7 +37,7 @@ class Parts:
         self.is_finished = path.exists()
         """Whether there is the whole table."""
         if self.is_finished:
-            _check(path, manifest_of(path), manifest)
+            _check(path, _manifest_of(path), manifest)
             return
         self._folder.mkdir(exist_ok=True)
         file = self._folder / MANIFEST
@@ -80,7 +80,7 @@ class Parts:
                 writer.write_table(arrow.concat_tables(tables).combine_chunks())
 
 
-def manifest_of(path: Path) -> Manifest | None:
+def _manifest_of(path: Path) -> Manifest | None:
     """The manifest of a table; None of a file that is no table of a sweep."""
     arrow, parquet = extra("pyarrow"), extra("pyarrow.parquet")
     try:

@@ -6,8 +6,9 @@ import copy
 import math
 from typing import TYPE_CHECKING, Any
 
+from fishbone import _core
 from fishbone.equilibrium import solve
-from fishbone.errors import InvalidScenario
+from fishbone.errors import InvalidArgument, InvalidScenario
 from fishbone.scenario import Scenario
 from fishbone.sweep.extra import extra
 
@@ -30,15 +31,18 @@ UNBENT = frozenset(("bend_radius.spine.value", "least_spine_radius.value")) | {
 """Radii that are infinite where nothing bends, and null in a result."""
 
 
-def solve_part(
-    tables: dict[str, Any], numbers: dict[str, Number], first: int, values: Floats, *, shapes: bool
+def solve_part(  # noqa: PLR0913 - keywords all but four
+    tables: dict[str, Any], numbers: dict[str, Number], first: int, values: Floats, *, shapes: bool, version: str
 ) -> tuple[int, bytes]:
     """Solves the points from number `first` on, one after the other; returns `first` and a Parquet file of their rows.
 
     `numbers` are the fields that are swept. A point starts from nothing that another one has found.
 
     Shapes: values (points, fields).
+    Errors: `InvalidArgument` where the fishbone of this process is not of `version`, that of the sweep.
     """
+    if version != _core.__version__:
+        raise InvalidArgument(f"scheduler: found a worker with fishbone {_core.__version__}, allowed {version}")
     tables = copy.deepcopy(tables)
     rows = []
     for point, row in enumerate(values.tolist(), start=first):
@@ -46,11 +50,11 @@ def solve_part(
         for field, value in swept.items():
             numbers[field].put(tables, value)
         # The place of a support, which a result repeats, may be swept.
-        rows.append({"point": point, **swept} | _figures(tables, shapes=shapes) | swept)
+        rows.append({"point": point, **swept} | figures_of(tables, shapes=shapes) | swept)
     return first, _encode(rows)
 
 
-def _figures(tables: dict[str, Any], *, shapes: bool) -> Row:
+def figures_of(tables: dict[str, Any], *, shapes: bool) -> Row:
     """The figures of the result of a scenario; of an invalid one its status and message."""
     try:
         scenario = Scenario.from_dict(tables)

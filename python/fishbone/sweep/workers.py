@@ -12,7 +12,7 @@ from fishbone.errors import FishboneError, InvalidArgument
 from fishbone.sweep.extra import extra
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Callable, Generator, Iterable, Iterator
 
 AHEAD = 500
 """Greatest number of tasks that wait or run at a time."""
@@ -25,9 +25,9 @@ def results(
     task: Callable[..., Any],
     arguments: Iterable[tuple[Any, ...]],
     count: int,
-    **keywords: object,
-) -> Iterator[Any]:
-    """The results of a task for each of its `count` arguments, in the order in which they are done.
+    common: dict[str, object],
+) -> Generator[Any, None, None]:
+    """The results of a task for `count` arguments, each with the keywords `common`, as they are done.
 
     A task whose worker is lost is done anew by another one. `scheduler` is the address of a Dask scheduler; None is a
     cluster of processes on this machine, one for each core.
@@ -40,7 +40,7 @@ def results(
     distributed = extra("distributed")
     try:
         with _client(scheduler, count) as client:
-            yield from _collected(client, task, arguments, keywords)
+            yield from _collected(client, task, arguments, common)
     except ImportError as error:
         raise InvalidArgument(f"scheduler: found workers without a package ({error}), allowed those with all") from None
     except distributed.scheduler.KilledWorker as error:
@@ -53,12 +53,12 @@ def _collected(
     client: Any,  # noqa: ANN401 - of dask
     task: Callable[..., Any],
     arguments: Iterable[tuple[Any, ...]],
-    keywords: dict[str, object],
+    common: dict[str, object],
 ) -> Iterator[Any]:
     waiting = iter(arguments)
 
     def submitted(count: int) -> list[Any]:
-        return [client.submit(task, *some, pure=False, **keywords) for some in itertools.islice(waiting, count)]
+        return [client.submit(task, *some, pure=False, **common) for some in itertools.islice(waiting, count)]
 
     running = extra("distributed").as_completed(submitted(AHEAD), loop=client.loop, with_results=True)
     for _, result in running:
