@@ -343,6 +343,22 @@ def test_workers_without_a_package_are_named(scheduler):
         list(found)
 
 
+def test_a_scheduler_that_is_lost_ends_a_sweep(belt, tmp_path):
+    cluster = distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0")
+    with (
+        cluster,
+        pytest.raises(fb.FishboneError, match="scheduler: found the connection lost; repeat the sweep to go on"),
+    ):
+        fb.sweep(
+            belt,
+            tmp_path / "a.parquet",
+            {Y: (0.5, 0.6, 1000)},
+            scheduler=cluster.scheduler_address,
+            progress=lambda *_: cluster.close(),
+        )
+    assert list((tmp_path / "a.parquet.parts").glob("*.parquet"))
+
+
 def test_workers_that_are_lost_with_the_same_points_end_a_sweep(belt, tmp_path):
     others = spawned()
 

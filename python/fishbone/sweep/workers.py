@@ -45,8 +45,6 @@ def results(
         raise InvalidArgument(f"scheduler: found workers without a package ({error}), allowed those with all") from None
     except distributed.scheduler.KilledWorker as error:
         raise FishboneError(f"workers: found {error.allowed_failures + 1} lost in a row with the same points") from None
-    except (distributed.CancelledError, distributed.comm.CommClosedError):
-        raise FishboneError(f"scheduler: found the connection to {scheduler} lost; start again to go on") from None
 
 
 def _collected(
@@ -61,7 +59,9 @@ def _collected(
         return [client.submit(task, *some, pure=False, **common) for some in itertools.islice(waiting, count)]
 
     running = extra("distributed").as_completed(submitted(AHEAD), loop=client.loop, with_results=True)
-    for _, result in running:
+    for future, result in running:
+        if future.cancelled():
+            raise FishboneError("scheduler: found the connection lost; repeat the sweep to go on")
         yield result
         running.update(submitted(1))
 
