@@ -99,6 +99,7 @@ def _draw_map(found: Sweep, limit: Limit | None) -> Figure:
         drawn = axes.scatter(x, y, c=values, cmap=name, s=8.0, plotnonfinite=False)
         failed = np.isnan(values)
         axes.plot(x[failed], y[failed], **_FAILED)
+    axes.grid(visible=False)
     figure.colorbar(drawn, label=_label(found, column))
     for direction, field in zip("xy", found.fields, strict=True):
         axes.set(**{f"{direction}label": field})

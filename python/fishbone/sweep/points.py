@@ -147,11 +147,10 @@ def number_of(scenario: Scenario, field: str) -> Number:
 
 
 def _along(axis: tuple[float, float, int], place: NDArray[np.intp]) -> Floats:
-    """The numbers at places of an axis, with exact ends."""
+    """The numbers at places of an axis, those of `numpy.linspace`."""
     start, stop, count = axis
-    share = place / max(count - 1, 1)
-    numbers: Floats = start * (1.0 - share) + stop * share
-    return numbers
+    last = max(count - 1, 1)
+    return np.where(place == last, stop, place * ((stop - start) / last) + start)
 
 
 def _grid(ranges: Mapping[str, Sequence[float]]) -> Grid:
