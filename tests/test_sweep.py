@@ -467,6 +467,15 @@ def test_no_point_that_converges_ends_the_command_with_3(run, belt_file):
     assert Path("a.parquet").exists()
 
 
+@pytest.mark.parametrize("fields", [["belt.width"], ["belt.width", Y]])
+def test_a_sweep_without_any_figure_is_drawn_empty(run, belt_file, fields):
+    ranges = [word for field in fields for word in ("--set", f"{field}=-2:-1:2")]
+    code, out, _ = run(*ranges, "-o", "a.parquet", "--figure", "a.png", "--limit", "energy<9")
+    assert code == 3
+    assert f"yield 0.00%, 0 of {2 ** len(fields)} points" in out
+    assert Path("a.png").exists()
+
+
 @pytest.mark.parametrize(
     ("words", "found"),
     [

@@ -32,9 +32,9 @@ if TYPE_CHECKING:
 SCHEMA = "fishbone.sweep/1"
 SUFFIX = ".parquet"
 PARTS = 64
-"""Least number of parts of a sweep, so that all cores have work, as long as a part has a point."""
+"""Greatest number of parts of a sweep of few points: enough for all cores to have work to the end."""
 LARGEST_PART = 256
-"""Greatest number of points of a part."""
+"""Greatest number of points of a part: a sweep of more points has more parts."""
 
 
 class Sweep:
@@ -83,6 +83,8 @@ class Sweep:
         Errors: `InvalidArgument` where the limit is none, or its column has no numbers.
         """
         checked = limit_of(self.scenario, limit)
+        if "converged" not in self.statuses:  # there may be no figures at all
+            return np.zeros(len(self), dtype=np.bool_)
         figures = self.column(checked.column)
         if not np.issubdtype(figures.dtype, np.number):
             raise InvalidArgument(f"limit: found the column {checked.column}, allowed one of numbers")

@@ -64,8 +64,9 @@ def _draw_lines(found: Sweep, limit: Limit | None) -> Figure:
     """Figures over one field; crosses on the axis are points without an equilibrium."""
     panels = dict.fromkeys(PANELS if limit is None else (*PANELS, limit.column))
     columns = [column for column in panels if column in found.names]
-    figure = Figure(figsize=(_WIDTH, _PANEL * len(columns) + _DECORATION), layout="constrained")
-    rows = figure.subplots(max(len(columns), 1), 1, sharex=True, squeeze=False)[:, 0]
+    height = max(len(columns), 1)
+    figure = Figure(figsize=(_WIDTH, _PANEL * height + _DECORATION), layout="constrained")
+    rows = figure.subplots(height, 1, sharex=True, squeeze=False)[:, 0]
     [field] = found.fields
     places = found.column(field)
     for axes, column in zip(rows, columns, strict=False):
@@ -110,7 +111,7 @@ def _draw_limit(axes: Axes, grid: list[Floats], limit: Limit | None) -> None:
     """The line on a map at which the figure is at its limit, where it passes through the map."""
     values = grid[-1]
     is_plane = min(values.shape) > 1
-    if limit is not None and is_plane and np.nanmin(values) < limit.value < np.nanmax(values):
+    if limit is not None and is_plane and np.any(values < limit.value) and np.any(values > limit.value):
         axes.contour(*grid, levels=[limit.value], colors=chart.LIMIT["color"], linestyles=chart.LIMIT["linestyle"])
 
 
