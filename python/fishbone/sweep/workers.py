@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import gc
 import itertools
 import logging
 import signal
@@ -113,6 +114,8 @@ def _connected(scheduler: str) -> Any:  # noqa: ANN401 - of dask
         return extra("distributed").Client(scheduler, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError) as error:
         text = " ".join(str(error).split())
-        raise InvalidArgument(
-            f"scheduler: found {scheduler!r} ({text}), allowed the address of a Dask scheduler, as in tcp://host:8786"
-        ) from None
+    # Dask's client that has not connected waits for ever for a lock if it is collected while another one starts.
+    gc.collect()
+    raise InvalidArgument(
+        f"scheduler: found {scheduler!r} ({text}), allowed the address of a Dask scheduler, as in tcp://host:8786"
+    )
