@@ -371,7 +371,7 @@ def test_workers_that_are_lost_with_the_same_points_end_a_sweep(belt, tmp_path):
         dask.config.set({"distributed.scheduler.allowed-failures": 0}),
         pytest.raises(fb.FishboneError, match="workers: found 1 lost in a row with the same points"),
     ):
-        fb.sweep(belt, tmp_path / "a.parquet", GRID, progress=lose)
+        fb.sweep(belt, tmp_path / "a.parquet", {Y: (0.5, 0.6, 1000)}, progress=lose)
     assert list((tmp_path / "a.parquet.parts").glob("*.parquet"))
 
 
