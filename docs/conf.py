@@ -16,6 +16,7 @@ TREE = """
 :caption: Use
 
 docs/scenario
+docs/sweep
 docs/command
 docs/python/index
 docs/gallery

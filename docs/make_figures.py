@@ -7,6 +7,7 @@ levels, line styles and markers alone tell things apart; where there are colours
 from __future__ import annotations
 
 import sys
+import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -381,6 +382,17 @@ def strip_ribs() -> Figure:
     return figure
 
 
+# ------------------------------------------------------------------------------------------------------------ sweep
+
+
+def sweep() -> Figure:
+    """The sweep that docs/sweep.md runs: a sheet whose far clamp is moved along it and turned."""
+    ranges = {"supports[1].position[1]": (0.08, 0.18, 21), "supports[1].rotation[0]": (0.0, 1.2, 13)}
+    with tempfile.TemporaryDirectory() as folder:
+        found = fb.sweep(fb.load(ROOT / "scenarios" / "polystyrene.toml"), Path(folder) / "sweep.parquet", ranges)
+        return plot.sweep(found, limit="bend_radius.area.p99>18 mm")
+
+
 # --------------------------------------------------------------------------------------------- the source's method
 
 
@@ -434,7 +446,7 @@ def main() -> None:
     with mpl.rc_context(STYLE | {"savefig.dpi": 150.0}):
         save(shear_diagrams(), "shear_diagrams")
     drawn = (examples, convergence, bound, bend_radius, continuation, hinge_there_and_back)
-    for draw in (*drawn, shell_thickness, strip_ribs, collocation, locking):
+    for draw in (*drawn, shell_thickness, strip_ribs, sweep, collocation, locking):
         with mpl.rc_context(STYLE):
             save(draw(), draw.__name__)
 

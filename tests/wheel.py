@@ -34,7 +34,7 @@ def main() -> None:
 def check_names(contents: dict[str, bytes]) -> None:
     """Modules, stubs, scenarios, core and licence, and nothing else."""
     package = ROOT / "python" / "fishbone"
-    files = [*package.glob("*.py"), *package.glob("*.pyi"), package / "py.typed", *package.glob("scenarios/*.toml")]
+    files = [*package.rglob("*.py"), *package.glob("*.pyi"), package / "py.typed", *package.glob("scenarios/*.toml")]
     expected = {f"fishbone/{file.relative_to(package).as_posix()}" for file in files}
     found = {re.sub(r"^fishbone-[^/]+\.dist-info/", "dist-info/", name) for name in contents}
     core = {name for name in found if re.fullmatch(r"fishbone/_core\.(abi3\.so|pyd)", name)}

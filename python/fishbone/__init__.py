@@ -50,6 +50,7 @@ from fishbone.errors import (
 from fishbone.follow import Branch, Diagram, Event, Origin, Poses, follow
 from fishbone.scenario import Scenario, load
 from fishbone.sensitivity import Change, Gradient, Sensitivity
+from fishbone.sweep import Sweep, sweep
 from fishbone.tracker import Tracker, Update
 
 __all__ = [
@@ -93,6 +94,7 @@ __all__ = [
     "SpineRadius",
     "Strain",
     "StrainExtremes",
+    "Sweep",
     "Tracker",
     "Update",
     "__version__",
@@ -101,6 +103,7 @@ __all__ = [
     "load",
     "solve",
     "solve_many",
+    "sweep",
 ]
 
 

@@ -640,7 +640,8 @@ class Equilibrium:
     def outline(self, tolerance: float | None = None) -> Outline:
         """The outline of the flat board, exact except on arcs: chords are within `tolerance` of their arc.
 
-        The default tolerance is a thousandth of the width, the least a millionth. A closed belt is cut open at its start.
+        The default tolerance is a thousandth of the width, the least a millionth. A closed belt is cut open at its
+        start.
 
         Errors: `InvalidArgument` for another tolerance.
         """

@@ -65,26 +65,44 @@ def write_all(contents: Mapping[Path, bytes]) -> None:
         for path, content in contents.items():
             with _naming(path):
                 target = _target(path)
-                moves.append((path, drafts.enter_context(_draft(target, content)), target))
+                draft = drafts.enter_context(_draft(target))
+                draft.write_bytes(content)
+                moves.append((path, draft, target))
         for path, draft, target in moves:
             with _naming(path):
-                draft.replace(target)
+                _move(draft, target)
 
 
 @contextlib.contextmanager
-def _draft(target: Path, content: bytes) -> Iterator[Path]:
-    """A file beside the target, with the content, and the mode of the target or else that of a new file."""
-    status = _status(target)
-    obstacle = _protection(target, status)
+def whole(path: Path) -> Iterator[Path]:
+    """A draft for the body to write, which takes the place of a file after it, as `write_whole` does.
+
+    Errors: `OSError` with the path, and those of the body; the file is then as it was before.
+    """
+    with _naming(path):
+        target = _target(path)
+        with _draft(target) as draft:
+            yield draft
+            _move(draft, target)
+
+
+@contextlib.contextmanager
+def _draft(target: Path) -> Iterator[Path]:
+    """A place for a draft beside the target, which must be writable."""
+    obstacle = _protection(target, _status(target))
     if obstacle is not None:
         raise PermissionError(errno.EACCES, obstacle)
     # In a folder of its own the name is short and free, and the mode of a new file is that of any other.
     with tempfile.TemporaryDirectory(prefix=".", suffix=".part", dir=target.parent) as folder:
-        draft = Path(folder) / "draft"
-        draft.write_bytes(content)
-        if status is not None:
-            draft.chmod(stat.S_IMODE(status.st_mode))
-        yield draft
+        yield Path(folder) / "draft"
+
+
+def _move(draft: Path, target: Path) -> None:
+    """Moves a draft to its target, whose mode it takes over."""
+    status = _status(target)
+    if status is not None:
+        draft.chmod(stat.S_IMODE(status.st_mode))
+    draft.replace(target)
 
 
 @contextlib.contextmanager

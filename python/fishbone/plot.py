@@ -1,4 +1,4 @@
-"""Pictures of an equilibrium, of several, and of a diagram; needs `pip install "fishbone[plot]"`."""
+"""Pictures of an equilibrium, of several, of a diagram and of a sweep; needs `pip install "fishbone[plot]"`."""
 
 from __future__ import annotations
 
@@ -51,6 +51,8 @@ from fishbone.scene import (
     is_rigid,
     support_kind,
 )
+from fishbone.sweep import Sweep
+from fishbone.sweep.picture import draw as draw_sweep
 from fishbone.text import shown_name
 from fishbone.units import scale, unit, without_rounding
 
@@ -66,6 +68,7 @@ if TYPE_CHECKING:
     from fishbone.names import Place
 
     Style = dict[str, Any]
+    Subject = Equilibrium | Sequence[Equilibrium] | Diagram | Sweep
 
 SUFFIXES = (".png", ".pdf", ".svg")
 VIEWER = (0.38, 0.6, -0.7)
@@ -178,32 +181,47 @@ def diagram(diagram: Diagram, support: Place | None = None, *, radius_limit: flo
         return _draw_diagram(diagram, support, radius_limit)
 
 
-def encode(
-    subject: Equilibrium | Sequence[Equilibrium] | Diagram, suffix: str, *, radius_limit: float | None = None
-) -> bytes:
+def sweep(sweep: Sweep, *, limit: str | None = None) -> Figure:
+    """Figures of a sweep over its field, or a map of one figure over two fields, as they are in its table.
+
+    Over one field these are the energy, the least bend radius on the spine, the one exceeded on 99 % of the area, and
+    the figure of the limit; crosses on the axis are points that have not converged. A map is of the figure of the
+    limit, else of the radius on 99 % of the area; it is white where there is no equilibrium. The title has the yield
+    with a `limit`, which is given as for `Sweep.passes` and drawn as a line.
+
+    Errors: `InvalidArgument` where there are more than two fields, or the limit is invalid.
+    """
+    with mpl.rc_context(_STYLE):
+        return draw_sweep(sweep, limit)
+
+
+def encode(subject: Subject, suffix: str, *, radius_limit: float | None = None, limit: str | None = None) -> bytes:
     """The content of a picture file in the format of the suffix; equal for equal shapes as PNG and PDF.
 
-    The picture is that of `views` for an equilibrium, of `overview` for several, and of `diagram` for a diagram.
+    The picture is that of `views` for an equilibrium, of `overview` for several, of `diagram` for a diagram, and of
+    `sweep` for a sweep.
 
-    Errors: `InvalidArgument` where the suffix is not in `SUFFIXES`, or there is no shape.
+    Errors: `InvalidArgument` where the suffix is not in `SUFFIXES`, or there is no shape, and those of `sweep`.
     """
     suffix = suffix.lower()
     if suffix not in SUFFIXES:
         raise InvalidArgument(f"figure: found {suffix or 'no suffix'}, allowed {', '.join(SUFFIXES)}")
     content = io.BytesIO()
-    figure = _figure_of(subject, radius_limit)
+    figure = _figure_of(subject, radius_limit, limit)
     with mpl.rc_context(_STYLE):
         figure.savefig(content, format=suffix[1:], metadata=_METADATA[suffix])
     return content.getvalue()
 
 
-def _figure_of(subject: Equilibrium | Sequence[Equilibrium] | Diagram, radius_limit: float | None) -> Figure:
+def _figure_of(subject: Subject, radius_limit: float | None, limit: str | None) -> Figure:
     if isinstance(subject, Diagram):
         return diagram(subject, radius_limit=radius_limit)
+    if isinstance(subject, Sweep):
+        return sweep(subject, limit=limit)
     return views(subject) if isinstance(subject, Equilibrium) else overview(subject)
 
 
-def save(subject: Equilibrium | Sequence[Equilibrium] | Diagram, path: str | os.PathLike[str]) -> None:
+def save(subject: Subject, path: str | os.PathLike[str]) -> None:
     """Writes the picture of `encode` to a file, .png, .pdf or .svg.
 
     Errors: `InvalidArgument` for another suffix or where there is no shape, `OSError`.

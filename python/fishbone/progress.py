@@ -85,4 +85,9 @@ def _lines(state: Progress, done: threading.Event, _: Console) -> None:
     while not done.wait(wait):
         wait = time.monotonic() - start
         share = "" if state.share is None else f", {state.share:.0%}"
-        write_line(f"{state.words}{share}, after {wait:.0f} s")
+        write_line(f"{state.words}{share}, after {wait:.0f} s{_left(state.share, wait)}")
+
+
+def _left(share: float | None, elapsed: float) -> str:
+    """The time left at the rate so far, in words; nothing where no share is done."""
+    return f", about {elapsed * (1.0 - share) / share:.0f} s left" if share else ""
