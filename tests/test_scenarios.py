@@ -128,7 +128,7 @@ def test_outline_is_as_fine_as_asked_for() -> None:
     np.testing.assert_array_equal(fine.loops[0][0], fine.loops[0][-1])
 
 
-@pytest.mark.parametrize("tolerance", [0.0, -1.0, float("nan"), float("inf")])
+@pytest.mark.parametrize("tolerance", [0.0, -1.0, 1e-12, float("nan"), float("inf")])
 def test_a_tolerance_that_is_none_is_refused(tolerance: float) -> None:
     with pytest.raises(fb.InvalidArgument, match="tolerance: found"):
         solve(tables("curved")).outline(tolerance)

@@ -37,17 +37,18 @@ pub(crate) fn solve_many(
             let pool = &pool;
             let solves = scope.spawn(move || {
                 let outcomes = scenarios.par_iter().map_with(sender, |sender, scenario| {
-                    let found = solve(scenario);
+                    let found = proceed().is_continue().then(|| solve(scenario));
                     // The receiver is gone once an error has ended the wait.
                     let _ = sender.send(());
                     found
                 });
-                pool.install(|| outcomes.collect())
+                pool.install(|| outcomes.collect::<Option<_>>())
             });
             let waited = wait(&solved, all, progress.as_ref());
             stop.store(waited.is_err(), Ordering::Relaxed);
             let found = solves.join();
-            waited.map(|()| found.unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+            let found = found.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+            waited.map(|()| found.unwrap_or_default())
         })
     })
 }
