@@ -317,3 +317,27 @@ class _LeaningTheWrongWay:
         v = np.linspace(-WIDTH / 2.0, WIDTH / 2.0, n_across)
         rib = self.frame[:, :, 2] - self.rib_slope[:, None] * self.frame[:, :, 1]
         return np.asarray(self.position[:, None] + v[None, :, None] * rib[:, None])
+
+
+@pytest.mark.parametrize("name", ["example1", "curved", "bent", "polystyrene"])
+def test_triangles_of_the_surface_cover_it_and_face_along_the_normal(name):
+    found = fb.solve(fb.load(f"scenarios/{name}.toml"))
+    surface = found.surface(4)
+    triangles = found.surface_triangles(4)
+    assert triangles.shape == (2 * (len(found.u) - 1) * 3, 3)
+    a, b, c = surface.reshape(-1, 3)[triangles].transpose(1, 0, 2)
+    doubled = np.cross(b - a, c - a)
+    sizes = np.linalg.norm(doubled, axis=1)
+    normals = np.repeat(found.frame[:-1, :, 0], 6, axis=0)
+    # Triangles between two ribs at one joint have no area.
+    real = sizes > 1e-9 * sizes.max()
+    assert (np.einsum("ij,ij->i", doubled[real], normals[real]) > 0.8 * sizes[real]).all()
+    tables = fb.load(f"scenarios/{name}.toml").to_dict()["belt"]
+    area = 0.5 * sizes.sum()
+    np.testing.assert_allclose(area, tables["width"] * found.u[-1], rtol=0.05)
+
+
+def test_a_tracker_has_the_surface_of_its_equilibrium():
+    tracker = fb.Tracker(fb.load("scenarios/example1.toml"))
+    tracker.update([0.0, 0.55, 0.1], [0.0, 0.0, 0.0])
+    np.testing.assert_array_equal(tracker.surface(3), tracker.equilibrium().surface(3))

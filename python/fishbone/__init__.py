@@ -51,7 +51,7 @@ from fishbone.follow import Branch, Diagram, Event, Origin, Poses, follow
 from fishbone.scenario import Scenario, load
 from fishbone.sensitivity import Change, Gradient, Sensitivity
 from fishbone.sweep import Sweep, sweep
-from fishbone.tracker import Tracker, Update
+from fishbone.tracker import Tracker, Update, Updates
 
 __all__ = [
     "AreaRadii",
@@ -97,6 +97,7 @@ __all__ = [
     "Sweep",
     "Tracker",
     "Update",
+    "Updates",
     "__version__",
     "branches",
     "follow",

@@ -629,6 +629,21 @@ class Equilibrium:
         """
         return self._inner.surface(self._across(n_across))
 
+    def surface_triangles(self, n_across: int = 9) -> NDArray[np.int64]:
+        """Triangles of `surface`: indices of its points in order, counter-clockwise about +ξ.
+
+        They are the same for all shapes with as many nodes, as a display wants them. `mesh` has the whole board: the
+        corners beyond the last ribs, too, and of a closed belt its joint.
+
+        Shapes: (2 (n − 1)(n_across − 1), 3).
+        Errors: as `surface`.
+        """
+        points = np.arange(len(self.u) * self._across(n_across)).reshape(len(self.u), n_across)
+        corners = points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:]
+        a, b, c, d = (corner.ravel() for corner in corners)
+        triangles = np.stack([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)], axis=1)
+        return triangles.reshape(-1, 3)
+
     def mesh(self, n_across: int = 9) -> tuple[Floats, NDArray[np.int64]]:
         """Vertices and triangles of the surface.
 

@@ -42,6 +42,26 @@ class Update(NamedTuple):
     """Energy released in snaps, in the unit of the scenario."""
 
 
+class Updates(NamedTuple):
+    """The results of `Tracker.update_many`, m of them: one for each pose that was tried.
+
+    Units: those of the scenario.
+    """
+
+    updates: list[Update]
+    """The result of each update."""
+    valid: int
+    """Number of poses that were reached: the tracker is at the last of these, or where it was if there is none."""
+    u: Floats
+    """Arc length of the nodes of the shape before the first update, shape (n,)."""
+    position: Floats
+    """Spine positions at these nodes after each update, shape (m, n, 3)."""
+    force: Floats
+    """Force of the moving support on the belt after each update, shape (m, 3)."""
+    moment: Floats
+    """Moment of the moving support on the belt about the support point, shape (m, 3)."""
+
+
 class Tracker:
     """A minimum of a belt whose support moves: every update starts from the shape before, and stays on its branch.
 
@@ -111,6 +131,26 @@ class Tracker:
         """
         return Update(*self._inner.update(triple("position", position), triple("rotation", rotation)))
 
+    def update_many(self, positions: npt.ArrayLike, rotations: npt.ArrayLike, *, stop_on_snap: bool = True) -> Updates:
+        """Moves the support from pose to pose, as `update` does, without Python in between.
+
+        Ends after a pose at which no equilibrium was found and, unless `stop_on_snap` is false, after a snap. Positions
+        and reactions are those after each update; where an update fails those of the pose before, at which the tracker
+        stays.
+
+        Shapes: (m, 3) both.
+        Units: those of the scenario; rad.
+        Errors: those of `update`, before the first update.
+        """
+        rows = [_rows("positions", positions), _rows("rotations", rotations)]
+        if len(rows[0]) != len(rows[1]):
+            raise InvalidArgument(f"rotations: found {len(rows[1])}, allowed {len(rows[0])}, one a position")
+        u = self.u
+        found, shapes, (force, moment) = self._inner.update_many(np.stack(rows, axis=1).tolist(), stop_on_snap)
+        updates = [Update(*update) for update in found]
+        valid = sum(update.status == "converged" for update in updates)
+        return Updates(updates, valid, u, np.reshape(shapes, (len(shapes), len(u), 3)), force, moment)
+
     @property
     def energy(self) -> float:
         """Total potential."""
@@ -151,6 +191,14 @@ class Tracker:
         force, moment = self._inner.reaction(self._index_of(support))
         return Reaction(np.array(force), np.array(moment))
 
+    def surface(self, n_across: int = 9) -> Floats:
+        """Points of the surface, as `Equilibrium.surface`; `Equilibrium.surface_triangles` has its triangles.
+
+        Shapes: (n, n_across, 3).
+        Errors: as `Equilibrium.surface`.
+        """
+        return self.equilibrium().surface(n_across)
+
     def equilibrium(self) -> Equilibrium:
         """The equilibrium of the current shape."""
         scenario, found = self._inner.equilibrium()
@@ -158,6 +206,22 @@ class Tracker:
 
     def _index_of(self, support: Place) -> int:
         return support_index(support, self._inner.supports, float(self.u[-1]))
+
+
+def _rows(name: str, values: npt.ArrayLike) -> Floats:
+    """Rows of three finite numbers.
+
+    Errors: `InvalidArgument`, whose message begins with `name`.
+    """
+    try:
+        rows = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InvalidArgument(f"{name}: found {type(values).__name__}, allowed rows of three numbers") from None
+    if rows.ndim != 2 or rows.shape[1] != 3:  # noqa: PLR2004 - x, y, z
+        raise InvalidArgument(f"{name}: found shape {rows.shape}, allowed (m, 3)")
+    if not np.isfinite(rows).all():
+        raise InvalidArgument(f"{name}: found a number that is not finite, allowed finite numbers")
+    return rows
 
 
 def triple(name: str, values: npt.ArrayLike) -> list[float]:

@@ -7,6 +7,7 @@ use crate::exclusive::Exclusive;
 use crate::scenario::Scenario;
 use crate::stored::{self, Reduced};
 use fishbone::analysis::tracking as core;
+use fishbone::equilibrium::Status;
 use fishbone::io::stored::Stored;
 use fishbone::names::Named;
 use nalgebra::{Matrix3, Vector3};
@@ -54,6 +55,18 @@ impl Shown {
 
 /// Status, whether it snapped, energy, iterations, largest residual, largest displacement and energy released in snaps.
 type Updated = (&'static str, bool, f64, usize, f64, f64, f64);
+
+fn updated(update: &core::Update) -> Updated {
+    (
+        update.status.name(),
+        update.snapped,
+        update.energy,
+        update.iterations,
+        update.residuals.largest(),
+        update.jump,
+        update.released,
+    )
+}
 
 impl Tracker {
     /// Copies a part of the shape. No object of Python is made meanwhile: this may run other Python code.
@@ -129,14 +142,52 @@ impl Tracker {
             update
         })?;
         let update = update.map_err(|refused| invalid_scenario(py, &refused, None))?;
+        Ok(updated(&update))
+    }
+
+    /// As `update`, from pose to pose, with the support's reactions and the positions at the nodes of the first shape; ends
+    /// after an update that has not converged and, if asked to, after a snap.
+    ///
+    /// Shapes: (m, 2, 3); one shape (n, 3) an update, forces and moments (updates, 3).
+    /// Errors: as `update`; of an invalid pose, before the first update.
+    fn update_many<'py>(
+        &self,
+        py: Python<'py>,
+        poses: Vec<[[f64; 3]; 2]>,
+        stop_on_snap: bool,
+    ) -> PyResult<(Vec<Updated>, Vec<Points<'py>>, [Points<'py>; 2])> {
+        let mut shapes = Vec::new();
+        let mut wrenches = Vec::new();
+        let updates = self.moving.with(py, |tracker, signals| {
+            let poses: Vec<_> = poses.iter().map(|pose| pose.map(Vector3::from)).collect();
+            for [position, rotation] in &poses {
+                tracker.check_pose(position, rotation)?;
+            }
+            let nodes = tracker.nodes();
+            let mut updates = Vec::new();
+            for [position, rotation] in &poses {
+                let update = tracker.update(position, rotation, &mut || signals.proceed())?;
+                let ends = update.status != Status::Converged || stop_on_snap && update.snapped;
+                updates.push(update);
+                shapes.push(tracker.positions_at(&nodes));
+                wrenches.push(tracker.reaction(tracker.support()));
+                if ends || signals.proceed().is_break() {
+                    break;
+                }
+            }
+            self.shown().copy(tracker);
+            Ok(updates)
+        })?;
+        let updates: Vec<core::Update> =
+            updates.map_err(|refused| invalid_scenario(py, &refused, None))?;
+        let shapes = shapes.iter().map(|shape| array::points(py, shape));
+        let forces: Vec<_> = wrenches.iter().map(|wrench| wrench.force).collect();
+        let moments: Vec<_> = wrenches.iter().map(|wrench| wrench.moment).collect();
+        let wrenches = [forces, moments].map(|parts| array::points(py, &parts));
         Ok((
-            update.status.name(),
-            update.snapped,
-            update.energy,
-            update.iterations,
-            update.residuals.largest(),
-            update.jump,
-            update.released,
+            updates.iter().map(updated).collect(),
+            shapes.collect(),
+            wrenches,
         ))
     }
 

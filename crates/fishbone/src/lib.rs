@@ -57,6 +57,8 @@ pub mod names;
 pub mod problem;
 pub mod ritz;
 pub mod scenario;
+#[cfg(feature = "io")]
+pub(crate) mod serial;
 pub mod solve;
 pub mod strip;
 pub mod surface;

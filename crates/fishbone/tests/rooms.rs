@@ -4,8 +4,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Names of the rooms from the lowest to the highest, words. A file may name its own room and the rooms before it.
-const ROOMS: [&str; 12] = [
+const ROOMS: [&str; 13] = [
     "names",
+    "serial",
     "geometry",
     "strip",
     "board",

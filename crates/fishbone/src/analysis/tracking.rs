@@ -102,6 +102,11 @@ impl Tracker {
         Ok(Self(led))
     }
 
+    /// The support that moves, by its place in the scenario.
+    pub fn support(&self) -> usize {
+        of_led!(&self.0, led => led.support())
+    }
+
     /// Arc lengths of the supports, in the order of the scenario.
     pub fn supports(&self) -> Vec<f64> {
         of_led!(&self.0, led => led.supports())
@@ -127,6 +132,19 @@ impl Tracker {
         of_led!(&mut self.0, led => led.update(position, rotation, proceed))
     }
 
+    /// Checks a pose as [`Self::update`] does, without moving.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::update`].
+    pub fn check_pose(
+        &self,
+        position: &Vector3<f64>,
+        rotation: &Vector3<f64>,
+    ) -> Result<(), ScenarioError> {
+        of_led!(&self.0, led => led.check_pose(position, rotation))
+    }
+
     /// The present equilibrium, with all its data; not converged where elements turn too far for a belt.
     pub fn equilibrium(&mut self) -> Equilibrium {
         of_led!(&mut self.0, led => led.equilibrium())
@@ -141,6 +159,15 @@ impl Tracker {
     pub fn positions(&self) -> impl Iterator<Item = Vector3<f64>> {
         let poses = of_led!(&self.0, led => led.poses()).iter();
         poses.map(|pose| of_led!(&self.0, led => led.position(pose)))
+    }
+
+    /// Positions at arc lengths of nodes that the mesh has had, on whatever mesh the tracker is now.
+    pub fn positions_at(&mut self, nodes: &[f64]) -> Vec<Vector3<f64>> {
+        if self.nodes() == nodes {
+            return self.positions().collect();
+        }
+        let spine = self.equilibrium().spine;
+        nodes.iter().map(|u| spine.at(*u).pose.position).collect()
     }
 
     /// Arc lengths of the nodes.

@@ -114,7 +114,7 @@ pub struct Equilibrium {
     /// Iterations, over all attempts.
     pub iterations: usize,
     /// The error by the mesh, once it has been estimated.
-    #[cfg_attr(feature = "io", serde(with = "crate::io::stored::once"))]
+    #[cfg_attr(feature = "io", serde(with = "crate::serial::once"))]
     pub(crate) error: OnceLock<Option<MeshError>>,
     /// The solved programme; `None` where the method has no multipliers.
     pub(crate) solved: Option<AnySolved>,

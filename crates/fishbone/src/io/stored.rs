@@ -156,74 +156,6 @@ impl<'de> Deserialize<'de> for Path {
     }
 }
 
-/// A list that has to be empty, as its entries cannot be stored.
-pub(crate) mod none {
-    use super::*;
-
-    pub(crate) fn serialize<T, S: Serializer>(
-        list: &[T],
-        serializer: S,
-    ) -> Result<S::Ok, S::Error> {
-        match list.is_empty() {
-            true => ().serialize(serializer),
-            false => Err(S::Error::custom("obstacles of the caller's own")),
-        }
-    }
-
-    pub(crate) fn deserialize<'de, T, D: Deserializer<'de>>(
-        deserializer: D,
-    ) -> Result<Vec<T>, D::Error> {
-        <()>::deserialize(deserializer)?;
-        Ok(Vec::new())
-    }
-}
-
-/// A list of arrays, entry by entry: serde knows no arrays of any length.
-pub(crate) mod arrays {
-    use super::*;
-
-    pub(crate) fn serialize<T: Serialize, const N: usize, S: Serializer>(
-        list: &[[T; N]],
-        serializer: S,
-    ) -> Result<S::Ok, S::Error> {
-        serializer.collect_seq(list.as_flattened())
-    }
-
-    pub(crate) fn deserialize<'de, T: Deserialize<'de> + Copy, const N: usize, D>(
-        deserializer: D,
-    ) -> Result<Vec<[T; N]>, D::Error>
-    where
-        D: Deserializer<'de>,
-    {
-        let entries: Vec<T> = Deserialize::deserialize(deserializer)?;
-        let (arrays, rest) = entries.as_chunks();
-        match rest.is_empty() {
-            true => Ok(arrays.to_vec()),
-            false => Err(D::Error::custom("an array with entries missing")),
-        }
-    }
-}
-
-/// A value that may not have been found yet.
-pub(crate) mod once {
-    use super::*;
-    use std::sync::OnceLock;
-
-    pub(crate) fn serialize<T: Serialize, S: Serializer>(
-        value: &OnceLock<T>,
-        serializer: S,
-    ) -> Result<S::Ok, S::Error> {
-        value.get().serialize(serializer)
-    }
-
-    pub(crate) fn deserialize<'de, T: Deserialize<'de>, D: Deserializer<'de>>(
-        deserializer: D,
-    ) -> Result<OnceLock<T>, D::Error> {
-        let value: Option<T> = Deserialize::deserialize(deserializer)?;
-        Ok(value.map_or_else(OnceLock::new, OnceLock::from))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -259,15 +191,6 @@ mod tests {
         let problem = problem().about(Vector3::new(0.1, 1.0 / 3.0, f64::MIN_POSITIVE));
         let stored = postcard::to_stdvec(&problem).unwrap();
         assert_eq!(postcard::from_bytes::<Problem>(&stored).unwrap(), problem);
-    }
-
-    #[test]
-    fn test_list_of_obstacles_is_stored_only_if_it_is_empty() {
-        #[derive(Debug, PartialEq, Serialize, Deserialize)]
-        struct Obstacles(#[serde(with = "none")] Vec<std::ops::RangeFull>);
-        assert!(postcard::to_stdvec(&Obstacles(vec![..])).is_err());
-        let stored = postcard::to_stdvec(&Obstacles(Vec::new())).unwrap();
-        assert_eq!(postcard::from_bytes(&stored), Ok(Obstacles(Vec::new())));
     }
 
     #[test]

@@ -67,10 +67,10 @@ pub struct BeltProgram<D = DevelopableEnergy, const F: usize = 2, const N: usize
     /// Signed half turns after which the end of a closed belt joins its start; the ties of its seam are among the links.
     pub half_turns: Option<i32>,
     /// Obstacles that nodes must not enter.
-    #[cfg_attr(feature = "io", serde(with = "crate::io::stored::none"))]
+    #[cfg_attr(feature = "io", serde(with = "crate::serial::none"))]
     pub obstacles: Vec<NodeObstacle>,
     /// Prescribed fields of every node.
-    #[cfg_attr(feature = "io", serde(with = "crate::io::stored::arrays"))]
+    #[cfg_attr(feature = "io", serde(with = "crate::serial::arrays"))]
     fixed: Vec<[Option<f64>; F]>,
 }
 

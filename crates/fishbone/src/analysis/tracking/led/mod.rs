@@ -93,6 +93,11 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
         Follower::new(program, settings, minimum).ok_or(NoTracker::Marginal)
     }
 
+    /// As [`Tracker::support`](super::Tracker::support).
+    pub(super) fn support(&self) -> usize {
+        self.support
+    }
+
     /// As [`Tracker::supports`](super::Tracker::supports).
     pub(super) fn supports(&self) -> Vec<f64> {
         let supports = self.problem.scenario().supports.iter();
@@ -107,9 +112,8 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
         rotation: &Vector3<f64>,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Result<Update, ScenarioError> {
-        let (from, support) = (self.pose, self.support);
-        self.problem
-            .check_support_pose(support, position, rotation)?;
+        let from = self.pose;
+        self.check_pose(position, rotation)?;
         let goal = Pose {
             frame: exp(rotation),
             position: (position - self.problem.origin()) / self.units().length,
@@ -142,6 +146,16 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
             iterations: way.iterations,
             residuals: self.follower.residuals(),
         })
+    }
+
+    /// As [`Tracker::check_pose`](super::Tracker::check_pose).
+    pub(super) fn check_pose(
+        &self,
+        position: &Vector3<f64>,
+        rotation: &Vector3<f64>,
+    ) -> Result<(), ScenarioError> {
+        self.problem
+            .check_support_pose(self.support, position, rotation)
     }
 
     /// Whether a pose is proved to be out of reach. The proof is only tried where the belt is nearly straight to another support.
