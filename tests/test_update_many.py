@@ -90,9 +90,9 @@ def test_no_poses_change_nothing():
     [
         ([[0.0, 0.5, 0.0]], [[0.0, 0.0, 0.0]] * 2, "rotations: found 2, allowed 1, one a position"),
         ([0.0, 0.5, 0.0], [[0.0, 0.0, 0.0]], r"positions: found shape \(3,\), allowed \(m, 3\)"),
-        ([[0.0, 0.5, 0.0]], [[0.0, float("nan"), 0.0]], "rotations: found a number that is not finite"),
+        ([[0.0, 0.5, 0.0]], [[0.0, float("nan"), 0.0]], "rotations: found nan, allowed finite numbers"),
         (None, [[0.0, 0.0, 0.0]], r"positions: found shape \(\), allowed"),
-        ("here", [[0.0, 0.0, 0.0]], "positions: found str, allowed rows of three numbers"),
+        ("here", [[0.0, 0.0, 0.0]], r"positions: found 'here', allowed numbers of shape \(m, 3\)"),
     ],
 )
 def test_what_are_no_poses_is_refused(positions, rotations, error):

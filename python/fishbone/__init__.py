@@ -48,6 +48,7 @@ from fishbone.errors import (
     NoTracker,
 )
 from fishbone.follow import Branch, Diagram, Event, Origin, Poses, follow
+from fishbone.pose import Pose
 from fishbone.scenario import Scenario, load
 from fishbone.sensitivity import Change, Gradient, Sensitivity
 from fishbone.sweep import Sweep, sweep
@@ -84,6 +85,7 @@ __all__ = [
     "Origin",
     "Outline",
     "PointStrain",
+    "Pose",
     "Poses",
     "Reaction",
     "Residuals",

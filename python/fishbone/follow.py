@@ -15,8 +15,8 @@ from fishbone import _core
 from fishbone.equilibrium import Equilibrium, Reaction, solve
 from fishbone.errors import InvalidArgument
 from fishbone.names import Kind, Motion
+from fishbone.pose import numbers_of
 from fishbone.scenario import Scenario
-from fishbone.tracker import triple
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -485,7 +485,9 @@ def _led(start: Equilibrium, path: Poses) -> _Way:
             position, rotation = pose
         except (TypeError, ValueError):
             raise InvalidArgument(f"poses[{index}]: found {pose!r}, allowed a position and a rotation") from None
-        poses.append((triple(f"poses[{index}][0]", position), triple(f"poses[{index}][1]", rotation)))
+        place = numbers_of(f"poses[{index}][0]", position, (3,)).tolist()
+        turn = numbers_of(f"poses[{index}][1]", rotation, (3,)).tolist()
+        poses.append((place, turn))
     # The source's method has no reactions, and the core refuses it whatever the support.
     support = _index_of(start, path.support) if start._inner.reactions else 0  # noqa: SLF001 - of this package
     inner = _core.Path.poses(start.scenario._inner, support, poses, path.motion)  # noqa: SLF001 - of this package

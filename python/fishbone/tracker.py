@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -11,6 +10,7 @@ from fishbone import _core
 from fishbone.equilibrium import Equilibrium, Reaction, solve
 from fishbone.errors import InvalidArgument
 from fishbone.places import support_index
+from fishbone.pose import Pose, numbers_of, pose_of
 from fishbone.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -121,15 +121,20 @@ class Tracker:
         tracker._inner = inner  # noqa: SLF001 - its own class
         return tracker
 
-    def update(self, position: npt.ArrayLike, rotation: npt.ArrayLike) -> Update:
+    def update(self, position: Pose | npt.ArrayLike, rotation: npt.ArrayLike | None = None) -> Update:
         """Moves the support to a position and a rotation vector, world axes, and follows the minimum.
 
-        Shapes: (3,) each.
+        In place of both a `Pose` may be given, which takes quaternions, too, or a homogeneous matrix.
+
+        Shapes: (3,) each; a matrix (4, 4).
         Units: those of the scenario; rad.
         Errors: `InvalidArgument` for other shapes and for numbers that are not finite; `InvalidScenario` for a pose
         that no scenario may hold, such as a position too many lengths away. The tracker then stays where it was.
         """
-        return Update(*self._inner.update(triple("position", position), triple("rotation", rotation)))
+        if rotation is None:
+            position, rotation = pose_of("pose", position)
+        position, rotation = numbers_of("position", position, (3,)), numbers_of("rotation", rotation, (3,))
+        return Update(*self._inner.update(position.tolist(), rotation.tolist()))
 
     def update_many(self, positions: npt.ArrayLike, rotations: npt.ArrayLike, *, stop_on_snap: bool = True) -> Updates:
         """Moves the support from pose to pose, as `update` does, without Python in between.
@@ -142,7 +147,7 @@ class Tracker:
         Units: those of the scenario; rad.
         Errors: those of `update`, before the first update.
         """
-        rows = [_rows("positions", positions), _rows("rotations", rotations)]
+        rows = [numbers_of("positions", positions, (None, 3)), numbers_of("rotations", rotations, (None, 3))]
         if len(rows[0]) != len(rows[1]):
             raise InvalidArgument(f"rotations: found {len(rows[1])}, allowed {len(rows[0])}, one a position")
         u = self.u
@@ -206,36 +211,3 @@ class Tracker:
 
     def _index_of(self, support: Place) -> int:
         return support_index(support, self._inner.supports, float(self.u[-1]))
-
-
-def _rows(name: str, values: npt.ArrayLike) -> Floats:
-    """Rows of three finite numbers.
-
-    Errors: `InvalidArgument`, whose message begins with `name`.
-    """
-    try:
-        rows = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InvalidArgument(f"{name}: found {type(values).__name__}, allowed rows of three numbers") from None
-    if rows.ndim != 2 or rows.shape[1] != 3:  # noqa: PLR2004 - x, y, z
-        raise InvalidArgument(f"{name}: found shape {rows.shape}, allowed (m, 3)")
-    if not np.isfinite(rows).all():
-        raise InvalidArgument(f"{name}: found a number that is not finite, allowed finite numbers")
-    return rows
-
-
-def triple(name: str, values: npt.ArrayLike) -> list[float]:
-    """Three finite numbers, as a list.
-
-    Errors: `InvalidArgument`, whose message begins with `name`.
-    """
-    try:
-        vector = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InvalidArgument(f"{name}: found {values!r}, allowed three numbers") from None
-    if vector.shape != (3,):
-        raise InvalidArgument(f"{name}: found shape {vector.shape}, allowed (3,)")
-    x, y, z = vector.tolist()
-    if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(z)):
-        raise InvalidArgument(f"{name}: found {[x, y, z]}, allowed finite numbers")
-    return [x, y, z]

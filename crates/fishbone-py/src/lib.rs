@@ -8,6 +8,7 @@ mod errors;
 mod exclusive;
 mod follow;
 mod names;
+mod pose;
 mod scenario;
 mod sensitivity;
 mod signals;
@@ -29,6 +30,8 @@ mod _core {
     use crate::follow::{Diagram, Path, follow};
     #[pymodule_export]
     use crate::names::names;
+    #[pymodule_export]
+    use crate::pose::{rotation_of_matrix, rotation_of_quaternion};
     #[pymodule_export]
     use crate::scenario::Scenario;
     #[pymodule_export]
