@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -249,3 +250,33 @@ def test_what_cannot_be_followed_is_refused() -> None:
         fb.Tracker(example("fishbone", solver={"method": "ritz"}))
     with pytest.raises(fb.NoSupport):
         fb.Tracker(example(), 5)
+
+
+def test_an_update_has_the_reason_why_a_pose_was_not_reached() -> None:
+    """A pose out of reach is proved to be; of another it is known only that nothing was found."""
+    tracker = fb.Tracker(example("fishbone", elements=40))
+    reached = tracker.update(*way(40)[3])
+    assert (reached.message, reached.solved_afresh) == ("", False)
+    far = tracker.update([0.0, 2.0, 0.0], [0.0, 0.0, 0.0])
+    assert far.status == "infeasible"
+    assert re.search(r"^supports\[0\] and supports\[1\].* apart, .* more than the belt between them", far.message)
+    hard = tracker.update([0.2, 0.86, -0.16], [0.8, -0.1, -0.3])
+    assert hard.status == "not_converged"
+    assert hard.message == "no minimum was found on the way to this pose, nor at it: move there in smaller steps"
+
+
+def test_an_update_reports_that_the_pose_was_solved_afresh() -> None:
+    """The way to the pose is too long to be followed; small steps lead elsewhere, or to the same minimum."""
+    tracker = fb.Tracker(example("fishbone", elements=40))
+    update = tracker.update([-0.25, 0.63, 0.0], [0.6, 1.2, 0.5])
+    assert (update.status, update.solved_afresh, update.snapped) == ("converged", True, True)
+    assert tracker.equilibrium().status == "converged"
+
+
+def test_the_residual_of_an_update_is_the_distance_of_the_support_from_its_pose() -> None:
+    tracker = fb.Tracker(example())
+    for position, rotation in way(40)[:5]:
+        update = tracker.update(position, rotation)
+        off = np.linalg.norm(tracker.position[-1] - position) / tracker.u[-1]
+        assert off <= 2.0 * update.residual + 1e-15
+        assert update.residual < 1e-8

@@ -200,7 +200,7 @@ class Sensitivity:
     ) -> tuple[_Floats, _Floats, _Floats, _Row, _Row]: ...
     def jacobian(self, support: int) -> _Floats: ...
 
-_Updated = tuple[Status, bool, float, int, float, float, float]
+_Updated = tuple[Status, bool, float, int, float, float, float, str, bool]
 
 @final
 class Tracker:

@@ -35,11 +35,15 @@ class Update(NamedTuple):
     iterations: int
     """Steps of Newton's method."""
     residual: float
-    """Largest residual, lengths in U and energy in mean R_f/U."""
+    """Largest violation of what the supports and links prescribe, lengths in U and turns in rad."""
     jump: float
     """Largest displacement of a node in a snap; 0 without one."""
     released: float
     """Energy released in snaps, in the unit of the scenario."""
+    message: str
+    """One line: why the pose was not reached, and what to try; empty where it was."""
+    solved_afresh: bool
+    """Whether the belt could not be followed to the pose, so that the scenario there was solved afresh."""
 
 
 class Updates(NamedTuple):

@@ -53,18 +53,21 @@ impl Shown {
     }
 }
 
-/// Status, whether it snapped, energy, iterations, largest residual, largest displacement and energy released in snaps.
-type Updated = (&'static str, bool, f64, usize, f64, f64, f64);
+/// Status, whether it snapped, energy, iterations, residual of the supports, largest displacement and energy released in snaps,
+/// message, whether it was solved afresh.
+type Updated = (&'static str, bool, f64, usize, f64, f64, f64, String, bool);
 
-fn updated(update: &core::Update) -> Updated {
+fn updated(update: core::Update) -> Updated {
     (
         update.status.name(),
         update.snapped,
         update.energy,
         update.iterations,
-        update.residuals.largest(),
+        update.residuals.constraint,
         update.jump,
         update.released,
+        update.message,
+        update.solved_afresh,
     )
 }
 
@@ -130,7 +133,7 @@ impl Tracker {
         Ok((slf.get_type().getattr("from_bytes")?, (bytes,)))
     }
 
-    /// (status, snapped, energy, iterations, largest residual, jump, energy released).
+    /// The data of the update.
     ///
     /// Errors: `InvalidScenario` for a pose that no scenario may hold; those that a signal handler raises,
     /// `KeyboardInterrupt` first of all; `RuntimeError` inside of another update of this thread.
@@ -142,7 +145,7 @@ impl Tracker {
             update
         })?;
         let update = update.map_err(|refused| invalid_scenario(py, &refused, None))?;
-        Ok(updated(&update))
+        Ok(updated(update))
     }
 
     /// As `update`, from pose to pose, with the support's reactions and the positions at the nodes of the first shape; ends
@@ -185,7 +188,7 @@ impl Tracker {
         let moments: Vec<_> = wrenches.iter().map(|wrench| wrench.moment).collect();
         let wrenches = [forces, moments].map(|parts| array::points(py, &parts));
         Ok((
-            updates.iter().map(updated).collect(),
+            updates.into_iter().map(updated).collect(),
             shapes.collect(),
             wrenches,
         ))

@@ -46,6 +46,10 @@ named!(impl NoTracker {
 pub struct Update {
     /// Whether the belt is in equilibrium under the new pose; unless converged, the tracker keeps its last pose.
     pub status: Status,
+    /// One line for people: why the pose was not reached; empty where it was.
+    pub message: String,
+    /// Whether the belt could not be followed to the pose, so that its problem there was solved afresh.
+    pub solved_afresh: bool,
     /// Whether the equilibrium that was followed ceased to exist or to be stable on the way, or could not be followed, and
     /// the belt has snapped to another equilibrium, by `solver.snap_size` or more.
     pub snapped: bool,

@@ -139,6 +139,8 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
         let units = self.units();
         Ok(Update {
             status,
+            message: self.message(status, &goal),
+            solved_afresh: way.solved_afresh && status == Status::Converged,
             snapped: way.jump > 0.0,
             jump: way.jump * units.length,
             released: way.released * units.energy,
@@ -146,6 +148,22 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
             iterations: way.iterations,
             residuals: self.follower.residuals(),
         })
+    }
+
+    /// Why a pose was not reached, for people; empty where it was.
+    fn message(&self, status: Status, goal: &Pose) -> String {
+        let too_far = || self.problem_at(goal).ok()?.unreachable_supports();
+        match status {
+            Status::Converged => String::new(),
+            Status::Infeasible => too_far().map_or_else(
+                || "no shape of the belt meets the supports at this pose".to_owned(),
+                |too_far| too_far.to_string(),
+            ),
+            Status::NotConverged => {
+                "no minimum was found on the way to this pose, nor at it: move there in smaller steps"
+                    .to_owned()
+            }
+        }
     }
 
     /// As [`Tracker::check_pose`](super::Tracker::check_pose).
@@ -421,6 +439,7 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
         };
         let mesh = Mesh::of(&problem, self.follower.program());
         let found = D::solve_near(&problem, &mesh, self.follower.point(), proceed);
+        way.solved_afresh = true;
         match self.take(&found, way) {
             true => Status::Converged,
             false if found.status == Status::Infeasible => Status::Infeasible,

@@ -13,6 +13,8 @@ pub(super) struct Way {
     /// The equilibrium at its start, once the belt has been led on in parts.
     pub(super) start: Option<Equilibrium>,
     pub(super) iterations: usize,
+    /// Whether the problem at its end was solved afresh.
+    pub(super) solved_afresh: bool,
     /// Largest displacement of a node in a snap, in U.
     pub(super) jump: f64,
     /// Energy released, in mean R_f/U.
@@ -27,6 +29,7 @@ impl Way {
             turn: Vector3::zeros(),
             start: None,
             iterations: 0,
+            solved_afresh: false,
             jump: 0.0,
             released: 0.0,
         };
