@@ -18,6 +18,8 @@ __all__ = [
     "branches",
     "follow",
     "names",
+    "rotation_of_matrix",
+    "rotation_of_quaternion",
     "solve",
     "solve_from",
     "solve_many",
