@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import signal
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,6 +15,12 @@ from fishbone.branches import _Budget, _search
 ROOT = Path(__file__).parent.parent
 FEW = _Budget(sums=40, perturbed=4, continued=2)
 """Enough for the planar arch: its lowest equilibria, a saddle, and one that passes through itself."""
+
+
+@pytest.fixture(scope="session", autouse=True)
+def control_c() -> None:
+    """Ctrl-C as on a terminal: jobs that a shell starts in the background ignore it, and so do their children."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")

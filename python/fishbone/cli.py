@@ -15,7 +15,7 @@ import click
 
 import fishbone
 from fishbone import examples as shipped
-from fishbone.command import Commands, Failure, Input, Interrupted, Invalid, NoEquilibrium, Output
+from fishbone.command import PICTURE, Commands, Failure, Input, Interrupted, Invalid, NoEquilibrium, Output
 from fishbone.errors import NoBranch
 from fishbone.files import write_all
 from fishbone.follow import out_of_reach
@@ -55,7 +55,7 @@ command.add_command(sweep)
 @click.option("--out", type=Output(".json"), help="Write the result: .json.")
 @click.option(
     "--figure",
-    type=Output(".png", ".pdf", ".svg"),
+    type=PICTURE,
     help="Draw top, front and side view: .png, .pdf or .svg.",
 )
 @click.option(
@@ -221,7 +221,7 @@ def _warn(file: Path, equilibria: list[Equilibrium]) -> None:
 @click.option("--table", type=Output(".csv"), help="Write a report on all states: .csv.")
 @click.option(
     "--figure",
-    type=Output(".png", ".pdf", ".svg"),
+    type=PICTURE,
     help="Draw energy, height and force along the path: .png, .pdf or .svg.",
 )
 @click.option(

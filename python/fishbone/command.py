@@ -1,4 +1,4 @@
-"""What commands of the command line share: exit codes, files to read and to write, pictures."""
+"""What commands of the command line share: exit codes, files to read and to write."""
 
 from __future__ import annotations
 
@@ -87,6 +87,9 @@ class Output(click.Path):
         if obstacle is not None:
             self.fail(f"{path}: {obstacle}", param, ctx)
         return path
+
+
+PICTURE = Output(".png", ".pdf", ".svg")
 
 
 class Command(click.Command):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import fishbone
-from fishbone.command import Command, Input, Invalid, NoEquilibrium, Output
+from fishbone.command import PICTURE, Command, Input, Invalid, NoEquilibrium, Output
 from fishbone.files import write_whole
 from fishbone.progress import progress
 from fishbone.sweep import SUFFIX
@@ -48,7 +48,7 @@ _PLUS_MINUS = re.compile(r"(?:±|\+-)\s*(.*)")
 @click.option("--scheduler", metavar="ADDRESS", help="Solve on a Dask cluster: tcp://HOST:PORT of its scheduler.")
 @click.option(
     "--figure",
-    type=Output(".png", ".pdf", ".svg"),
+    type=PICTURE,
     help="Draw the figures over one number, or a map over two: .png, .pdf or .svg.",
 )
 @click.option(
