@@ -55,7 +55,7 @@ CALLS = {
     "modes": lambda found: found.modes(100),
     "error": lambda found: found.error,
     "to_dict": lambda found: found.to_dict(),
-    "refined": lambda found: found.refined(20_000),
+    "refined": lambda found: found.refined(100_000),
     "snap_margin": lambda found: fb.solve(fine(3000)).snap_margin(),
     "follow": lambda found: fb.follow(fine(3000), {"supports[1].position[1]": 0.2}),
     "update": lambda found: fb.Tracker(found).update([0.3, 0.3, 0.3], [1.0, 0.0, 0.0]),

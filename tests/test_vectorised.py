@@ -82,7 +82,8 @@ def test_kernels_of_stages_work_on_several_numbers_at_a_time(kernels):
     # Of the elimination of belts 0.07 is scalar: pivots are divided by one after the other. Of that of the programme
     # that proves flat parts stable it is 0.16, and 0.25 and 0.27 of the steps there: its odd size leaves a remainder,
     # and ties of controls, at joints alone, are products of small matrices.
-    shares = [scalar_share(counts) for counts in kernels]
-    assert max(shares) < 0.28, kernels
+    # The compiler makes some of the kernels twice, one for each part of the core that calls them.
+    distinct = {tuple(sorted(counts.items())): scalar_share(counts) for counts in kernels}
+    assert max(distinct.values()) < 0.28, kernels
     # A fourth such kernel has lost its lanes.
-    assert sum(share >= 0.15 for share in shares) == 3, kernels
+    assert sum(share >= 0.15 for share in distinct.values()) == 3, kernels
