@@ -16,6 +16,7 @@ ORIGIN = [0.0, 0.0, 0.0]
 BELT = {"width": 0.1, "rigidity": 1.0, "segments": [{"kind": "straight", "length": 1.0}]}
 START = {"at": "start", "position": ORIGIN, "rotation": ORIGIN}
 END = {"at": "end", "position": [0.0, 0.6, 0.1], "rotation": ORIGIN}
+SLIDE = {"at": "end", "position": [0.0, 0.8, "free"]}
 PIN = {"at": "end", "position": [0.0, 0.6, 0.1]}
 NO_SLACK = END | {"position": [0.0, 1.0, 0.0]}
 TOO_FAR = END | {"position": [0.0, 2.0, 0.0]}
@@ -171,14 +172,14 @@ CASES = {
         lambda: fb.Tracker(scenario(START, TOO_FAR)),
         {"reason": "not_converged", "solve_message": apart},
     ),
-    "tracker of a pin": (
+    "tracker of a slide": (
         fb.NoTracker,
-        lambda: fb.Tracker(scenario(START, PIN)),
-        {"reason": "not_clamped", "support": 1},
+        lambda: fb.Tracker(scenario(START, SLIDE)),
+        {"reason": "not_held", "support": 1},
     ),
     "tracker of no support": (
         fb.NoTracker,
-        lambda: _core.Tracker(solved()._inner, 7),
+        lambda: _core.Tracker(solved()._inner, [7]),
         {"reason": "no_support", "support": 7},
     ),
     "path of no number": (

@@ -10,6 +10,10 @@ POSITION = [0.05, 0.5, 0.1]
 ROTATIONS = [[0.0, 0.0, 0.0], [0.3, -0.2, 0.5], [1e-9, 0.0, 0.0], [0.0, 3.0, 0.0], [0.0, 0.0, np.pi - 1e-7]]
 
 
+def example1(supports=("end",)):
+    return fb.Tracker(fb.load("scenarios/example1.toml"), supports=supports)
+
+
 def homogeneous(rotation):
     matrix = np.eye(4)
     matrix[:3, :3] = Rotation.from_rotvec(rotation).as_matrix()
@@ -81,7 +85,12 @@ def test_a_tracker_takes_every_way_to_write_a_pose():
         (lambda: fb.Pose.from_matrix(2.0 * np.eye(4)), "matrix: found columns that are no right-handed"),
         (lambda: fb.Pose.from_matrix(homogeneous([0.0] * 3).T), r"matrix: found the last row \[0\.05"),
         (lambda: fb.Pose.from_matrix(np.full((4, 4), np.nan)), "matrix: found .*, allowed finite numbers"),
-        (lambda: fb.Tracker(fb.load("scenarios/example1.toml")).update(POSITION), r"pose: found shape \(3,\)"),
+        (lambda: example1().update([*POSITION, 0.0]), r"pose: found shape \(4,\)"),
+        (lambda: example1().update([[1.0], [2.0, 3.0]], None), r"position: found shape \(1,\)"),
+        (lambda: example1().update({"end": POSITION}, POSITION), "rotation: found one beside poses by support"),
+        (lambda: example1(["start", "end"]).update(POSITION, POSITION), "pose: found one for 2 moving supports"),
+        (lambda: example1().update(POSITION, max_time=0.0), "max_time: found 0.0, allowed a finite positive number"),
+        (lambda: example1().update(POSITION, max_iterations=0), "max_iterations: found 0, allowed a"),
     ],
 )
 def test_what_is_no_pose_is_refused(make, error):

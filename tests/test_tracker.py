@@ -230,7 +230,7 @@ def test_pose_that_no_scenario_may_hold_is_refused_in_the_same_words(
 
 
 def test_what_cannot_be_followed_is_refused() -> None:
-    """No equilibrium, no clamp, no multipliers, no such support."""
+    """No equilibrium, no whole position, no multipliers, no such support, none at all, one twice."""
     with pytest.raises(fb.NoTracker, match="nothing to follow"):
         fb.Tracker(
             example(
@@ -240,16 +240,21 @@ def test_what_cannot_be_followed_is_refused() -> None:
                 ]
             )
         )
-    pinned = [
+    sliding = [
         {"at": "start", "position": [0.0, 0.0, 0.0], "rotation": [0.0, 0.0, 0.0]},
-        {"at": "end", "position": [0.0, 0.8, 0.1]},
+        {"at": "end", "position": [0.0, 0.8, "free"]},
     ]
     with pytest.raises(fb.NoTracker, match=r"supports\[1\] does not hold"):
-        fb.Tracker(example(supports=pinned))
+        fb.Tracker(example(supports=sliding))
     with pytest.raises(fb.NoTracker, match="source's method"):
         fb.Tracker(example("fishbone", solver={"method": "ritz"}))
     with pytest.raises(fb.NoSupport):
         fb.Tracker(example(), 5)
+    for supports in ([], ["end", 1]):
+        with pytest.raises(
+            fb.InvalidArgument, match=r"^supports: found .*, allowed one support or several, each once$"
+        ):
+            fb.Tracker(example(), supports=supports)
 
 
 def test_an_update_has_the_reason_why_a_pose_was_not_reached() -> None:
@@ -262,7 +267,7 @@ def test_an_update_has_the_reason_why_a_pose_was_not_reached() -> None:
     assert re.search(r"^supports\[0\] and supports\[1\].* apart, .* more than the belt between them", far.message)
     hard = tracker.update([0.2, 0.86, -0.16], [0.8, -0.1, -0.3])
     assert hard.status == "not_converged"
-    assert hard.message == "no minimum was found on the way to this pose, nor at it: move there in smaller steps"
+    assert hard.message == "no minimum was found farther on the way, nor at its end: move there in smaller steps"
 
 
 def test_an_update_reports_that_the_pose_was_solved_afresh() -> None:

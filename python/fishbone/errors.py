@@ -109,7 +109,7 @@ class NoModes(FishboneError):  # noqa: N818
 class NoTracker(FishboneError):  # noqa: N818
     """There is no equilibrium to track, or its support cannot be moved."""
 
-    reason: Literal["no_multipliers", "not_converged", "not_clamped", "no_support", "marginal"] | None = None
+    reason: Literal["no_multipliers", "not_converged", "not_held", "no_support", "marginal"] | None = None
     """The reason: the source's method has no multipliers; the solve has not converged; the support does not
     hold a whole pose; there is no such support; or the equilibrium is no strict minimum."""
     support: int | None = None

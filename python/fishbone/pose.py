@@ -98,3 +98,22 @@ def pose_of(name: str, pose: Any) -> Pose:  # noqa: ANN401 - whatever a caller b
     if isinstance(pose, (tuple, list)) and len(pose) == 2:  # noqa: PLR2004 - position and rotation
         return Pose(*pose)
     return Pose.from_matrix(numbers_of(name, pose, (4, 4)))
+
+
+def parts_of(name: str, pose: Any) -> tuple[list[float], list[float] | None]:  # noqa: ANN401 - whatever a caller brings
+    """The position and the rotation vector of a pose, as `pose_of` takes it; of a position alone, with None.
+
+    Errors: `InvalidArgument`, whose message begins with `name`.
+    """
+    if _is_position(pose):
+        return numbers_of(name, pose, (3,)).tolist(), None
+    pose = pose_of(name, pose)
+    position = numbers_of("position", pose.position, (3,))
+    return position.tolist(), numbers_of("rotation", pose.rotation, (3,)).tolist()
+
+
+def _is_position(pose: Any) -> bool:  # noqa: ANN401 - whatever a caller brings
+    try:
+        return bool(np.shape(pose) == (3,))
+    except ValueError:  # of rows of several lengths
+        return False

@@ -1,7 +1,9 @@
-"""Tracking of a minimum while one of its supports moves, fast enough for the control loop of a robot."""
+"""Tracking of a minimum while some of its supports move, fast enough for the control loop of a robot."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -10,10 +12,12 @@ from fishbone import _core
 from fishbone.equilibrium import Equilibrium, Reaction, solve
 from fishbone.errors import InvalidArgument
 from fishbone.places import support_index
-from fishbone.pose import Pose, numbers_of, pose_of
+from fishbone.pose import Pose, numbers_of, parts_of
 from fishbone.scenario import Scenario
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import numpy.typing as npt
     from numpy.typing import NDArray
 
@@ -26,7 +30,7 @@ class Update(NamedTuple):
     """The result of an update of a `Tracker`."""
 
     status: Status
-    """Unless "converged", no equilibrium was found at the new pose, and the tracker stays where it was."""
+    """Whether the belt is in equilibrium at the new poses; unless "converged" it is at `fraction` of the way."""
     snapped: bool
     """Whether the minimum followed ended or lost its stability on the way, so that the tracker is at another one, by
     `solver.snap_size` widths or more."""
@@ -35,15 +39,21 @@ class Update(NamedTuple):
     iterations: int
     """Steps of Newton's method."""
     residual: float
-    """Largest violation of what the supports and links prescribe, lengths in U and turns in rad."""
+    """Largest violation of what supports and links prescribe where the tracker is, lengths in U and turns in rad."""
     jump: float
     """Largest displacement of a node in a snap; 0 without one."""
     released: float
     """Energy released in snaps, in the unit of the scenario."""
     message: str
-    """One line: why the pose was not reached, and what to try; empty where it was."""
+    """One line: why the poses were not reached, and what to try; empty where they were."""
     solved_afresh: bool
-    """Whether the belt could not be followed to the pose, so that the scenario there was solved afresh."""
+    """Whether the belt could not be followed to the poses, so that the scenario there was solved afresh."""
+    fraction: float
+    """Share of the way to the new poses that was reached, 1 where "converged". The tracker is there, in equilibrium."""
+    taut: bool
+    """Whether the belt is pulled so straight that its shape does not determine all reactions: these are NaN."""
+    crosses_itself: bool | None
+    """Whether the belt passes through itself, as `Equilibrium.crosses_itself` finds; None unless this was asked for."""
 
 
 class Updates(NamedTuple):
@@ -55,44 +65,59 @@ class Updates(NamedTuple):
     updates: list[Update]
     """The result of each update."""
     valid: int
-    """Number of poses that were reached: the tracker is at the last of these, or where it was if there is none."""
+    """Number of poses that were reached; of the next one the tracker has made a `fraction` of the way."""
     u: Floats
     """Arc length of the nodes of the shape before the first update, shape (n,)."""
     position: Floats
     """Spine positions at these nodes after each update, shape (m, n, 3)."""
     force: Floats
-    """Force of the moving support on the belt after each update, shape (m, 3)."""
+    """Force of the moving support on the belt after each update, shape (m, 3); of k > 1 moving supports (m, k, 3)."""
     moment: Floats
-    """Moment of the moving support on the belt about the support point, shape (m, 3)."""
+    """Moment of the moving support on the belt about the support point, shape (m, 3), or (m, k, 3)."""
 
 
 class Tracker:
-    """A minimum of a belt whose support moves: every update starts from the shape before, and stays on its branch.
+    """A minimum of a belt whose supports move: every update starts from the shape before, and stays on its branch.
 
     A tracker starts at an equilibrium, such as one of `branches`, at that of a scenario, which is solved first, or in
-    the `state` of another tracker. `support` is named as for `Equilibrium.reaction`, and must hold a position and a
-    rotation; a state has its own. All properties are those after the last update that converged.
+    the `state` of another tracker. It moves `support`, or all of `supports`, named as for `Equilibrium.reaction`:
+    clamps, hinges and pins, each of which must hold all of a position; a state has its own. All properties are those
+    after the last update.
 
     `copy.copy`, `copy.deepcopy` and `pickle` make trackers that move by themselves, as `copy` does.
 
     Threads and handlers of signals may read the properties during an update: they get those before it. Of the methods
     one runs at a time: another thread waits, and a handler that interrupts one gets a `RuntimeError` from the others.
 
-    Errors: `NoTracker` where the solve finds no minimum, or where the support cannot be moved; `NoSupport`;
-    `InvalidArgument` for bytes that are no state of this version.
+    Errors: `NoTracker` where the solve finds no minimum, or where a support cannot be moved; `NoSupport`;
+    `InvalidArgument` for bytes that are no state of this version, and where no support or one twice is to move.
     """
 
-    __slots__ = ("_inner",)
+    __slots__ = ("_inner", "_moving")
     _inner: _core.Tracker
+    _moving: list[int]
 
-    def __init__(self, start: Scenario | Equilibrium | bytes, support: Place = "end") -> None:
+    def __init__(
+        self,
+        start: Scenario | Equilibrium | bytes,
+        support: Place = "end",
+        *,
+        supports: Sequence[Place] | None = None,
+    ) -> None:
         if isinstance(start, bytes):
-            self._inner = _core.Tracker.from_bytes(start)
+            self._take(_core.Tracker.from_bytes(start))
             return
         found = start if isinstance(start, Equilibrium) else solve(start)
         inner = found._inner  # noqa: SLF001 - of this package
-        # The source's method has no reactions, and the core refuses it whatever the support.
-        self._inner = _core.Tracker(inner, found._support_index(support) if inner.reactions else 0)  # noqa: SLF001
+        places = [support] if supports is None else list(supports)
+        # The source's method has no reactions, and the core refuses it whatever the supports.
+        moving = [found._support_index(place) for place in places] if inner.reactions else [0]  # noqa: SLF001
+        if not moving or len(set(moving)) < len(moving):
+            raise InvalidArgument(f"supports: found {places!r}, allowed one support or several, each once")
+        self._take(_core.Tracker(inner, moving))
+
+    def _take(self, inner: _core.Tracker) -> None:
+        self._inner, self._moving = inner, inner.moving
 
     @classmethod
     def restore(cls, state: bytes) -> Tracker:
@@ -122,43 +147,80 @@ class Tracker:
     @classmethod
     def _of(cls, inner: _core.Tracker) -> Tracker:
         tracker = cls.__new__(cls)
-        tracker._inner = inner  # noqa: SLF001 - its own class
+        tracker._take(inner)  # noqa: SLF001 - its own class
         return tracker
 
-    def update(self, position: Pose | npt.ArrayLike, rotation: npt.ArrayLike | None = None) -> Update:
+    def update(
+        self,
+        position: Pose | npt.ArrayLike | Mapping[Place, Pose | npt.ArrayLike],
+        rotation: npt.ArrayLike | None = None,
+        *,
+        max_time: float | None = None,
+        max_iterations: int | None = None,
+        check_crossing: bool = False,
+    ) -> Update:
         """Moves the support to a position and a rotation vector, world axes, and follows the minimum.
 
-        In place of both a `Pose` may be given, which takes quaternions, too, or a homogeneous matrix.
+        In place of both a `Pose` may be given, which takes quaternions, too, or a homogeneous matrix, or a position
+        alone, which keeps the rotation; of a pin the rotation is not read. Where several supports move, a mapping has
+        the poses of some of them by their names; the others stay. All move together, straight to their poses and turned
+        the shorter way round.
+
+        An update ends at the latest after `max_time`, but for the iteration that it is in, or after `max_iterations`;
+        then it is at a `fraction` of the way, and a further one goes on. With `max_iterations` alone it is the same on
+        every run.
 
         Shapes: (3,) each; a matrix (4, 4).
-        Units: those of the scenario; rad.
-        Errors: `InvalidArgument` for other shapes and for numbers that are not finite; `InvalidScenario` for a pose
-        that no scenario may hold, such as a position too many lengths away. The tracker then stays where it was.
+        Units: those of the scenario; rad; s.
+        Errors: `InvalidArgument` for other shapes, for numbers that are not finite, and for limits that are not
+        positive; `NoSupport`; `InvalidScenario` for a pose that no scenario may hold, such as a position too many
+        lengths away, and for a support that does not move. The tracker then stays where it was.
         """
-        if rotation is None:
-            position, rotation = pose_of("pose", position)
-        position, rotation = numbers_of("position", position, (3,)), numbers_of("rotation", rotation, (3,))
-        return Update(*self._inner.update(position.tolist(), rotation.tolist()))
+        if isinstance(position, Mapping):
+            if rotation is not None:
+                raise InvalidArgument("rotation: found one beside poses by support, allowed none")
+            to = [(self._index_of(place), *parts_of("pose", pose)) for place, pose in position.items()]
+        else:
+            if len(self._moving) > 1:
+                found = f"found one for {len(self._moving)} moving supports"
+                raise InvalidArgument(f'pose: {found}, allowed poses by support, as {{"end": pose}}')
+            pose: Any = position if rotation is None else (position, rotation)
+            to = [(self._moving[0], *parts_of("pose", pose))]
+        for name, limit in (("max_time", max_time), ("max_iterations", max_iterations)):
+            if limit is not None and not (limit > 0 and limit < math.inf):
+                raise InvalidArgument(f"{name}: found {limit}, allowed a finite positive number")
+        return Update(*self._inner.update(to, max_time, max_iterations, check_crossing))
 
-    def update_many(self, positions: npt.ArrayLike, rotations: npt.ArrayLike, *, stop_on_snap: bool = True) -> Updates:
+    def update_many(
+        self, positions: npt.ArrayLike, rotations: npt.ArrayLike | None = None, *, stop_on_snap: bool = True
+    ) -> Updates:
         """Moves the support from pose to pose, as `update` does, without Python in between.
 
-        Ends after a pose at which no equilibrium was found and, unless `stop_on_snap` is false, after a snap. Positions
-        and reactions are those after each update; where an update fails those of the pose before, at which the tracker
-        stays.
+        Ends after poses at which no equilibrium was found and, unless `stop_on_snap` is false, after a snap. Positions
+        and reactions are those after each update, also of one that has not reached its poses.
 
-        Shapes: (m, 3) both.
+        Shapes: (m, 3) both; of k > 1 moving supports (m, k, 3), in the order in which the tracker was given them.
+        Without rotations all are kept.
         Units: those of the scenario; rad.
         Errors: those of `update`, before the first update.
         """
-        rows = [numbers_of("positions", positions, (None, 3)), numbers_of("rotations", rotations, (None, 3))]
-        if len(rows[0]) != len(rows[1]):
-            raise InvalidArgument(f"rotations: found {len(rows[1])}, allowed {len(rows[0])}, one a position")
+        moving = self._moving
+        shape = (None, 3) if len(moving) == 1 else (None, len(moving), 3)
+        rows = numbers_of("positions", positions, shape).reshape(-1, len(moving), 3)
+        turns: list[Any] = [[None] * len(moving)] * len(rows)
+        if rotations is not None:
+            turned = numbers_of("rotations", rotations, shape).reshape(-1, len(moving), 3)
+            if len(turned) != len(rows):
+                raise InvalidArgument(f"rotations: found {len(turned)}, allowed {len(rows)}, one a position")
+            turns = turned.tolist()
+        to = [list(zip(moving, *poses, strict=True)) for poses in zip(rows.tolist(), turns, strict=True)]
         u = self.u
-        found, shapes, (force, moment) = self._inner.update_many(np.stack(rows, axis=1).tolist(), stop_on_snap)
+        found, shapes, (force, moment) = self._inner.update_many(to, stop_on_snap)
         updates = [Update(*update) for update in found]
         valid = sum(update.status == "converged" for update in updates)
-        return Updates(updates, valid, u, np.reshape(shapes, (len(shapes), len(u), 3)), force, moment)
+        each = (len(updates), *shape[1:])
+        positions = np.reshape(shapes, (len(shapes), len(u), 3))
+        return Updates(updates, valid, u, positions, force.reshape(each), moment.reshape(each))
 
     @property
     def energy(self) -> float:

@@ -175,7 +175,7 @@ impl Refusal for NoTracker {
     fn describe(&self, exception: &Bound<'_, PyAny>) -> PyResult<()> {
         match self {
             Self::Uncertified(uncertified) => solve_message(uncertified, exception),
-            Self::NotClamped(support) | Self::NoSupport(support) => {
+            Self::NotHeld(support) | Self::NoSupport(support) => {
                 exception.setattr("support", support)
             }
             _ => Ok(()),

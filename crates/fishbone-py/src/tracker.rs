@@ -10,13 +10,16 @@ use fishbone::analysis::tracking as core;
 use fishbone::equilibrium::Status;
 use fishbone::io::stored::Stored;
 use fishbone::names::Named;
+use fishbone::surface;
 use nalgebra::{Matrix3, Vector3};
 use numpy::IntoPyArray;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyType};
+use std::ops::ControlFlow;
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
-/// An equilibrium that is followed while one of its supports moves.
+/// An equilibrium that is followed while some of its supports move.
 #[pyclass(frozen, module = "fishbone._core")]
 pub(crate) struct Tracker {
     moving: Exclusive<core::Tracker>,
@@ -24,6 +27,8 @@ pub(crate) struct Tracker {
     shown: Mutex<Shown>,
     /// Arc length of every support.
     supports: Vec<f64>,
+    /// The supports that move.
+    moves: Vec<usize>,
 }
 
 /// The shape after the last update, which can be read during the next one.
@@ -54,10 +59,23 @@ impl Shown {
 }
 
 /// Status, whether it snapped, energy, iterations, residual of the supports, largest displacement and energy released in snaps,
-/// message, whether it was solved afresh.
-type Updated = (&'static str, bool, f64, usize, f64, f64, f64, String, bool);
+/// message, whether it was solved afresh, share of the way, whether the belt is taut, whether it crosses itself.
+type Updated = (
+    &'static str,
+    bool,
+    f64,
+    usize,
+    f64,
+    f64,
+    f64,
+    String,
+    bool,
+    f64,
+    bool,
+    Option<bool>,
+);
 
-fn updated(update: core::Update) -> Updated {
+fn updated(update: core::Update, crosses_itself: Option<bool>) -> Updated {
     (
         update.status.name(),
         update.snapped,
@@ -68,7 +86,41 @@ fn updated(update: core::Update) -> Updated {
         update.released,
         update.message,
         update.solved_afresh,
+        update.fraction,
+        update.taut,
+        crosses_itself,
     )
+}
+
+/// A support, its position and its rotation vector; what is None stays as it is.
+type Goal = (usize, Option<[f64; 3]>, Option<[f64; 3]>);
+
+fn goals(goals: &[Goal]) -> Vec<core::Goal> {
+    let goal = |(support, position, rotation): &Goal| core::Goal {
+        support: *support,
+        position: position.map(Vector3::from),
+        rotation: rotation.map(Vector3::from),
+    };
+    goals.iter().map(goal).collect()
+}
+
+/// What an update may take.
+struct Budget {
+    end: Option<Instant>,
+    iterations: Option<usize>,
+}
+
+impl Budget {
+    /// Whether to go on with one iteration more.
+    fn proceed(&mut self) -> ControlFlow<()> {
+        let is_late = self.end.is_some_and(|end| Instant::now() >= end);
+        let is_spent = self.iterations == Some(0);
+        if is_late || is_spent {
+            return ControlFlow::Break(());
+        }
+        self.iterations = self.iterations.map(|left| left - 1);
+        ControlFlow::Continue(())
+    }
 }
 
 impl Tracker {
@@ -82,6 +134,7 @@ impl Tracker {
         shown.copy(&tracker);
         Self {
             supports: tracker.supports(),
+            moves: tracker.moving().to_vec(),
             moving: Exclusive::new(tracker),
             shown: Mutex::new(shown),
         }
@@ -99,8 +152,8 @@ impl Tracker {
     ///
     /// Errors: `NoTracker`.
     #[new]
-    fn new(py: Python<'_>, equilibrium: &Equilibrium, support: usize) -> PyResult<Self> {
-        let tracker = core::Tracker::new(equilibrium.core(), support);
+    fn new(py: Python<'_>, equilibrium: &Equilibrium, moving: Vec<usize>) -> PyResult<Self> {
+        let tracker = core::Tracker::new(equilibrium.core(), &moving);
         tracker.map(Self::of).map_err(|error| raised(py, &error))
     }
 
@@ -133,47 +186,63 @@ impl Tracker {
         Ok((slf.get_type().getattr("from_bytes")?, (bytes,)))
     }
 
-    /// The data of the update.
+    /// The data of the update, which ends after `max_time` seconds or `max_iterations` at the latest; only if asked to, whether the
+    /// belt crosses itself.
     ///
     /// Errors: `InvalidScenario` for a pose that no scenario may hold; those that a signal handler raises,
     /// `KeyboardInterrupt` first of all; `RuntimeError` inside of another update of this thread.
-    fn update(&self, py: Python<'_>, position: [f64; 3], rotation: [f64; 3]) -> PyResult<Updated> {
-        let [position, rotation] = [position, rotation].map(Vector3::from);
+    fn update(
+        &self,
+        py: Python<'_>,
+        to: Vec<Goal>,
+        max_time: Option<f64>,
+        max_iterations: Option<usize>,
+        check_crossing: bool,
+    ) -> PyResult<Updated> {
+        let mut budget = Budget {
+            end: max_time.map(|seconds| Instant::now() + Duration::from_secs_f64(seconds)),
+            iterations: max_iterations,
+        };
         let update = self.moving.with(py, |tracker, signals| {
-            let update = tracker.update(&position, &rotation, &mut || signals.proceed());
+            let update = tracker.update(&goals(&to), &mut || {
+                signals.proceed()?;
+                budget.proceed()
+            });
             self.shown().copy(tracker);
-            update
+            let crosses_itself = check_crossing
+                .then(|| surface::crosses_itself(&tracker.equilibrium().spine).is_some());
+            update.map(|update| updated(update, crosses_itself))
         })?;
-        let update = update.map_err(|refused| invalid_scenario(py, &refused, None))?;
-        Ok(updated(update))
+        update.map_err(|refused| invalid_scenario(py, &refused, None))
     }
 
-    /// As `update`, from pose to pose, with the support's reactions and the positions at the nodes of the first shape; ends
-    /// after an update that has not converged and, if asked to, after a snap.
+    /// As `update`, goals after goals, with the reactions of the moving supports and the positions at the nodes of the first
+    /// shape; ends after an update that has not converged and, if asked to, after a snap.
     ///
-    /// Shapes: (m, 2, 3); one shape (n, 3) an update, forces and moments (updates, 3).
+    /// Shapes: one shape (n, 3) an update; forces and moments (k, 3) an update, of k moving supports.
     /// Errors: as `update`; of an invalid pose, before the first update.
     fn update_many<'py>(
         &self,
         py: Python<'py>,
-        poses: Vec<[[f64; 3]; 2]>,
+        to: Vec<Vec<Goal>>,
         stop_on_snap: bool,
     ) -> PyResult<(Vec<Updated>, Vec<Points<'py>>, [Points<'py>; 2])> {
         let mut shapes = Vec::new();
         let mut wrenches = Vec::new();
         let updates = self.moving.with(py, |tracker, signals| {
-            let poses: Vec<_> = poses.iter().map(|pose| pose.map(Vector3::from)).collect();
-            for [position, rotation] in &poses {
-                tracker.check_pose(position, rotation)?;
+            let to: Vec<_> = to.iter().map(|row| goals(row)).collect();
+            for goals in &to {
+                tracker.check(goals)?;
             }
             let nodes = tracker.nodes();
             let mut updates = Vec::new();
-            for [position, rotation] in &poses {
-                let update = tracker.update(position, rotation, &mut || signals.proceed())?;
+            for goals in &to {
+                let update = tracker.update(goals, &mut || signals.proceed())?;
                 let ends = update.status != Status::Converged || stop_on_snap && update.snapped;
                 updates.push(update);
                 shapes.push(tracker.positions_at(&nodes));
-                wrenches.push(tracker.reaction(tracker.support()));
+                let moving = tracker.moving().iter();
+                wrenches.extend(moving.map(|support| tracker.reaction(*support)));
                 if ends || signals.proceed().is_break() {
                     break;
                 }
@@ -187,11 +256,8 @@ impl Tracker {
         let forces: Vec<_> = wrenches.iter().map(|wrench| wrench.force).collect();
         let moments: Vec<_> = wrenches.iter().map(|wrench| wrench.moment).collect();
         let wrenches = [forces, moments].map(|parts| array::points(py, &parts));
-        Ok((
-            updates.into_iter().map(updated).collect(),
-            shapes.collect(),
-            wrenches,
-        ))
+        let updates = updates.into_iter().map(|update| updated(update, None));
+        Ok((updates.collect(), shapes.collect(), wrenches))
     }
 
     /// The present scenario and its equilibrium.
@@ -202,6 +268,12 @@ impl Tracker {
             let found = Equilibrium::of(|| tracker.equilibrium());
             (Scenario(found.core().problem().clone()), found)
         })
+    }
+
+    /// The supports that move, by their places in the scenario.
+    #[getter]
+    fn moving(&self) -> Vec<usize> {
+        self.moves.clone()
     }
 
     /// Arc length of every support.

@@ -151,7 +151,7 @@ impl Path {
         });
         let poses: Vec<_> = std::iter::once(first).chain(others).collect();
         for (i, (position, rotation)) in given.iter().enumerate() {
-            let checked = problem.check_support_pose(support, position, rotation);
+            let checked = problem.check_support_pose(support, Some(position), Some(rotation));
             checked.map_err(|error| NoPath::NoPose(i, error.to_string()))?;
         }
         if poses.iter().all(|pose| *pose == first) {

@@ -1,4 +1,4 @@
-//! Tracking: an equilibrium is followed at the rate of a robot while one of its supports moves.
+//! Tracking: an equilibrium is followed at the rate of a robot while some of its supports move.
 
 mod led;
 
@@ -21,11 +21,9 @@ pub enum NoTracker {
     /// There is no equilibrium.
     #[error(transparent)]
     Uncertified(#[from] Uncertified),
-    /// The support does not hold all of a pose.
-    #[error(
-        "supports[{0}] does not hold a position and a rotation, all of both: nothing can be moved there"
-    )]
-    NotClamped(usize),
+    /// The support does not hold all of a position.
+    #[error("supports[{0}] does not hold a position, all of it: it cannot be moved")]
+    NotHeld(usize),
     /// There is no such support.
     #[error("the scenario has no supports[{0}] that could move")]
     NoSupport(usize),
@@ -35,21 +33,36 @@ pub enum NoTracker {
 }
 
 named!(impl NoTracker {
-    NotClamped = "not_clamped",
+    NotHeld = "not_held",
     NoSupport = "no_support",
     Marginal = "marginal",
     ..Uncertified,
 });
 
-/// The outcome of a motion of the support.
+/// Where a support goes. What is `None` stays as it is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Goal {
+    /// The support, by its place in the scenario.
+    pub support: usize,
+    /// Position, world axes. Units: those of the scenario.
+    pub position: Option<Vector3<f64>>,
+    /// Rotation vector, world axes; of supports that hold a frame alone. Units: rad.
+    pub rotation: Option<Vector3<f64>>,
+}
+
+/// The outcome of a motion of the supports.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Update {
-    /// Whether the belt is in equilibrium under the new pose; unless converged, the tracker keeps its last pose.
+    /// Whether the belt is in equilibrium at the goals.
     pub status: Status,
-    /// One line for people: why the pose was not reached; empty where it was.
+    /// One line for people: why the goals were not reached; empty where they were.
     pub message: String,
-    /// Whether the belt could not be followed to the pose, so that its problem there was solved afresh.
+    /// Share of the way to the goals that was reached: unless converged, the tracker stays at the last equilibrium on the way.
+    pub fraction: f64,
+    /// Whether the belt could not be followed to the goals, so that its problem there was solved afresh.
     pub solved_afresh: bool,
+    /// Whether the belt is pulled so straight that its shape does not determine all reactions: these are NaN.
+    pub taut: bool,
     /// Whether the equilibrium that was followed ceased to exist or to be stable on the way, or could not be followed, and
     /// the belt has snapped to another equilibrium, by `solver.snap_size` or more.
     pub snapped: bool,
@@ -65,7 +78,7 @@ pub struct Update {
     pub residuals: Residuals,
 }
 
-/// An equilibrium and the support that moves.
+/// An equilibrium and the supports that move.
 #[derive(Clone)]
 #[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub struct Tracker(AnyLed);
@@ -89,26 +102,26 @@ macro_rules! of_led {
 }
 
 impl Tracker {
-    /// Starts at an equilibrium; the support is named by its place in the scenario.
+    /// Starts at an equilibrium; the supports that are to move are named by their places in the scenario.
     ///
     /// # Errors
     ///
-    /// [`NoTracker`] unless it has converged to a strict minimum and the support holds position and rotation.
-    pub fn new(equilibrium: &Equilibrium, support: usize) -> Result<Self, NoTracker> {
+    /// [`NoTracker`] unless it has converged to a strict minimum and each of the supports holds a position.
+    pub fn new(equilibrium: &Equilibrium, moving: &[usize]) -> Result<Self, NoTracker> {
         let led = match equilibrium.certified_any()? {
             AnySolved::Developable(solved) => {
-                AnyLed::Developable(Box::new(Led::new(equilibrium, solved, support)?))
+                AnyLed::Developable(Box::new(Led::new(equilibrium, solved, moving)?))
             }
             AnySolved::Shell(solved) => {
-                AnyLed::Shell(Box::new(Led::new(equilibrium, solved, support)?))
+                AnyLed::Shell(Box::new(Led::new(equilibrium, solved, moving)?))
             }
         };
         Ok(Self(led))
     }
 
-    /// The support that moves, by its place in the scenario.
-    pub fn support(&self) -> usize {
-        of_led!(&self.0, led => led.support())
+    /// The supports that move, by their places in the scenario.
+    pub fn moving(&self) -> &[usize] {
+        of_led!(&self.0, led => led.moving())
     }
 
     /// Arc lengths of the supports, in the order of the scenario.
@@ -116,37 +129,32 @@ impl Tracker {
         of_led!(&self.0, led => led.supports())
     }
 
-    /// Moves the support to a position and a rotation vector, world axes, and the belt with it.
+    /// Moves supports to their goals, together and each straight to its own, and the belt with them.
     ///
     /// Nothing is allocated where the equilibrium is followed on its mesh and the board has neither links nor bends. Unless the
     /// scenario fixes the mesh, its error is estimated where turning changes more within an element than before, and the belt
     /// goes on on another mesh where this one carries it no more; the mesh of a slender belt is graded anew at every update.
-    /// `proceed` is asked during the motion whether to go on; `Break` leaves the tracker at its last pose.
+    /// `proceed` is asked once an iteration whether to go on; `Break` leaves the tracker at the last equilibrium on the way.
     ///
     /// # Errors
     ///
-    /// [`ScenarioError`] for a pose that no scenario may hold: a pose that is not finite, too many lengths of the belt away, or
-    /// turned too far. The tracker stays at its last pose.
+    /// [`ScenarioError`] for a support that does not move, and for a pose that no scenario may hold: a pose that is not finite,
+    /// too many lengths of the belt away, or turned too far. The tracker stays where it was.
     pub fn update(
         &mut self,
-        position: &Vector3<f64>,
-        rotation: &Vector3<f64>,
+        goals: &[Goal],
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Result<Update, ScenarioError> {
-        of_led!(&mut self.0, led => led.update(position, rotation, proceed))
+        of_led!(&mut self.0, led => led.update(goals, proceed))
     }
 
-    /// Checks a pose as [`Self::update`] does, without moving.
+    /// Checks goals as [`Self::update`] does, without moving.
     ///
     /// # Errors
     ///
     /// As [`Self::update`].
-    pub fn check_pose(
-        &self,
-        position: &Vector3<f64>,
-        rotation: &Vector3<f64>,
-    ) -> Result<(), ScenarioError> {
-        of_led!(&self.0, led => led.check_pose(position, rotation))
+    pub fn check(&self, goals: &[Goal]) -> Result<(), ScenarioError> {
+        of_led!(&self.0, led => led.check(goals))
     }
 
     /// The present equilibrium, with all its data; not converged where elements turn too far for a belt.

@@ -138,7 +138,7 @@ impl Lifted {
         /// Deviation that is nothing but rounding, in U and rad.
         const ROUNDING: f64 = 2e-14;
         let program = problem.program(problem.elements());
-        let flat = laid_flat(problem, &program, None)?;
+        let flat = laid_flat(&program)?;
         let normal: Vector3<f64> = flat.poses[0].frame.column(0).into_owned();
         let off = |vector: Vector3<f64>| vector.dot(&normal) * normal;
         let beyond_rounding = |vector: Vector3<f64>| match vector.norm() <= ROUNDING {
@@ -148,7 +148,7 @@ impl Lifted {
         let supports = program.supports.iter();
         let moves: Vec<_> = supports
             .map(|support| {
-                let (way, turn) = deviation(support, &flat);
+                let (way, turn) = deviation(support, &flat.poses[support.node]);
                 // A turn about the normal is one in the plane.
                 let parts = [[off(way), way - off(way)], [turn - off(turn), off(turn)]];
                 parts.map(|both| both.map(beyond_rounding))
@@ -249,31 +249,47 @@ impl Lifted {
     }
 }
 
-/// The pose at which a support, given by its place in the scenario, holds a board flat where the other supports hold it; `None`
-/// where these do not hold it flat at rest. Units: those of the programme.
-pub(crate) fn flat_pose<D: Density<F>, const F: usize, const N: usize>(
-    problem: &Problem,
-    program: &BeltProgram<D, F, N>,
-    support: usize,
-) -> Option<Pose> {
-    /// Deviation up to which supports hold a board flat, in U and rad.
-    const NONE: f64 = 1e-9;
-    let flat = laid_flat(problem, program, Some(support))?;
-    let others = program.supports.iter().enumerate();
-    let mut others = others.filter(|(i, _)| *i != support);
-    let is_met = others.all(|(_, other)| {
-        let (way, turn) = deviation(other, &flat);
-        way.norm() + turn.norm() <= NONE
-    });
-    is_met.then(|| flat.poses[program.supports[support].node])
+/// A board as it lies flat and at rest, by the poses of the nodes that supports hold.
+#[derive(Debug, Clone)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) struct Flat {
+    /// Poses of the flat board, one a support, in the units of the programme.
+    poses: Vec<Pose>,
+    /// The support that the flat board is laid on.
+    clamp: usize,
 }
 
-/// By how much a support is off a shape in the coordinates that it holds: displacement, and turn in world axes.
-fn deviation<const F: usize>(
-    support: &NodeSupport,
-    shape: &BeltPoint<F>,
-) -> (Vector3<f64>, Vector3<f64>) {
-    let pose = &shape.poses[support.node];
+impl Flat {
+    /// The flat board of a programme; `None` where one support alone holds it or none holds a whole pose, and of a board that
+    /// is not at rest where it is flat.
+    pub(crate) fn of<D: Density<F>, const F: usize, const N: usize>(
+        program: &BeltProgram<D, F, N>,
+    ) -> Option<Self> {
+        let clamp = first_clamp(&program.supports).filter(|_| program.supports.len() > 1)?;
+        let flat = laid_flat(program)?;
+        let nodes = program.supports.iter().map(|support| support.node);
+        Some(Self {
+            poses: nodes.map(|node| flat.poses[node]).collect(),
+            clamp,
+        })
+    }
+
+    /// How far some supports are from holding the board flat, in U and rad, together; given in order.
+    pub(crate) fn distance(&self, supports: impl Iterator<Item = NodeSupport> + Clone) -> f64 {
+        let clamp = supports.clone().nth(self.clamp);
+        let held = clamp.and_then(|clamp| clamp.pose());
+        let held = held.expect("it was laid on a clamp");
+        let laid = held * self.poses[self.clamp].inverse();
+        let off = supports.zip(&self.poses).map(|(support, flat)| {
+            let (way, turn) = deviation(&support, &(laid * *flat));
+            way.norm() + turn.norm()
+        });
+        off.sum()
+    }
+}
+
+/// By how much a support is off a pose of its node in the coordinates that it holds: displacement, and turn in world axes.
+fn deviation(support: &NodeSupport, pose: &Pose) -> (Vector3<f64>, Vector3<f64>) {
     let way = |i: usize| support.position[i].map_or(0.0, |held| held - pose.position[i]);
     let turn = support.hold.frame().map_or_else(Vector3::zeros, |held| {
         let held: Matrix3<f64> = held.to_rotation_matrix().into_inner();
@@ -282,22 +298,21 @@ fn deviation<const F: usize>(
     (Vector3::from([0, 1, 2].map(way)), turn)
 }
 
-/// The flat board on a programme, where the first support that holds a whole pose holds it, but for one that does not count;
-/// `None` without such a support, and of a board that is not at rest where it is flat.
+/// The place of the first support that holds a whole pose.
+fn first_clamp(supports: &[NodeSupport]) -> Option<usize> {
+    supports.iter().position(|support| support.pose().is_some())
+}
+
+/// The flat board on a programme, where the first support that holds a whole pose holds it; `None` without such a support, and
+/// of a board that is not at rest where it is flat.
 fn laid_flat<D: Density<F>, const F: usize, const N: usize>(
-    problem: &Problem,
     program: &BeltProgram<D, F, N>,
-    but: Option<usize>,
 ) -> Option<BeltPoint<F>> {
     if program.is_curled() || program.is_loaded() || !program.links.is_empty() {
         return None;
     }
-    let is_clamp = |support: &usize| Some(*support) != but && problem.clamp(*support).is_some();
-    let clamp = (0..problem.scenario().supports.len()).find(is_clamp)?;
-    let clamp = &program.supports[clamp];
-    let Hold::Frame(frame) = clamp.hold else {
-        return None;
-    };
+    let clamp = &program.supports[first_clamp(&program.supports)?];
+    let held = clamp.pose()?;
     let start = Pose {
         frame: Matrix3::identity(),
         position: Vector3::zeros(),
@@ -308,11 +323,7 @@ fn laid_flat<D: Density<F>, const F: usize, const N: usize>(
         poses: vec![start; nodes],
     };
     program.carry(&mut flat);
-    let there = flat.poses[clamp.node];
-    let frame: Matrix3<f64> = frame.to_rotation_matrix().into_inner() * there.frame.transpose();
-    let [x, y, z] = clamp.position;
-    let position = Vector3::new(x?, y?, z?) - frame * there.position;
-    flat.poses[0] = Pose { frame, position };
+    flat.poses[0] = held * flat.poses[clamp.node].inverse();
     program.carry(&mut flat);
     Some(flat)
 }

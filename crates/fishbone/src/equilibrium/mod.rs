@@ -42,7 +42,7 @@ use std::sync::OnceLock;
 use thiserror::Error;
 
 pub(crate) use intrinsic::of_solution;
-pub(crate) use lifted::flat_pose;
+pub(crate) use lifted::Flat;
 pub(crate) use refinement::largest_change;
 
 named! {

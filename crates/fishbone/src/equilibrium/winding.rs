@@ -215,7 +215,9 @@ impl Way {
             *program = between.expect("the same belt on the same mesh");
         };
         let followed = follower.follow(to - from, &mut change, proceed);
-        let (problem, program) = (self.at(to), follower.program().clone());
+        let problem = self.at(to);
+        let mut program = follower.program().clone();
+        change(&mut program, 1.0);
         let fault = problem.active_set_fault(&program, follower.point());
         let before = follower.point().clone();
         let mut next = match followed.arrived && fault.is_none() {

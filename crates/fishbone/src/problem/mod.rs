@@ -140,9 +140,25 @@ impl Problem {
         support: usize,
         pose: &Pose,
     ) -> Result<Self, ScenarioError> {
-        let moved = self.moved(support, pose)?;
+        self.with_support_poses([(support, *pose)].into_iter())
+    }
+
+    /// The same problem with several supports, given by their places in the scenario, at other poses; the rotation counts only
+    /// where a support holds one.
+    ///
+    /// Units: those of the scenario.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::with_support_pose`].
+    pub(crate) fn with_support_poses(
+        &self,
+        poses: impl Iterator<Item = (usize, Pose)>,
+    ) -> Result<Self, ScenarioError> {
         let mut scenario = Scenario::clone(&self.scenario);
-        scenario.supports[support] = moved;
+        for (support, pose) in poses {
+            scenario.supports[support] = self.moved(support, &pose)?;
+        }
         self.on_the_same_belt(scenario)
     }
 
@@ -163,14 +179,14 @@ impl Problem {
     }
 
     /// Checks a position and a rotation vector for a support as a scenario is checked, without making the problem: nothing is
-    /// allocated.
+    /// allocated. What is `None` stays as it is.
     ///
     /// Units: those of the scenario; rad.
     pub(crate) fn check_support_pose(
         &self,
         support: usize,
-        position: &Vector3<f64>,
-        rotation: &Vector3<f64>,
+        position: Option<&Vector3<f64>>,
+        rotation: Option<&Vector3<f64>>,
     ) -> Result<(), ScenarioError> {
         let moved = self.held_at(support, position, rotation)?;
         self.scenario.check_support(support, &moved)
@@ -178,7 +194,7 @@ impl Problem {
 
     /// A support held at another pose.
     fn moved(&self, support: usize, pose: &Pose) -> Result<SupportSpec, ScenarioError> {
-        let moved = self.held_at(support, &pose.position, &log(&pose.frame))?;
+        let moved = self.held_at(support, Some(&pose.position), Some(&log(&pose.frame)))?;
         if !is_rotation(&pose.frame) {
             return Err(ScenarioError::invalid(
                 format!("supports[{support}].rotation"),
@@ -189,12 +205,13 @@ impl Problem {
         Ok(moved)
     }
 
-    /// A support held at another position and rotation vector.
+    /// A support held at another position and with another rotation vector, one of them or both; the rotation counts only if it
+    /// holds one.
     fn held_at(
         &self,
         support: usize,
-        position: &Vector3<f64>,
-        rotation: &Vector3<f64>,
+        position: Option<&Vector3<f64>>,
+        rotation: Option<&Vector3<f64>>,
     ) -> Result<SupportSpec, ScenarioError> {
         let Some(held) = self.scenario.supports.get(support) else {
             return Err(ScenarioError::invalid(
@@ -203,13 +220,14 @@ impl Problem {
                 "a support of the scenario",
             ));
         };
-        Ok(SupportSpec {
-            position: Some([0, 1, 2].map(|i| Component::Held(position[i]))),
-            rotation: Some((*rotation).into()),
-            euler: None,
-            quaternion: None,
-            ..held.clone()
-        })
+        let mut held = held.clone();
+        if let Some(position) = position {
+            held.position = Some([0, 1, 2].map(|i| Component::Held(position[i])));
+        }
+        if let Some(rotation) = rotation.filter(|_| held.frame().is_some()) {
+            (held.rotation, held.euler, held.quaternion) = (Some((*rotation).into()), None, None);
+        }
+        Ok(held)
     }
 
     /// The largest angle by which a rotation vector turns a support; 0 where all supports turn alike, and so none against
@@ -334,6 +352,16 @@ impl Problem {
     /// support, or it leaves any part of the pose free. Units: those of the scenario.
     pub(crate) fn clamp(&self, support: usize) -> Option<Pose> {
         clamp(&self.scenario, support)
+    }
+
+    /// The position that a support holds, with its frame, or no turn where it holds none; `None` unless it holds all of a
+    /// position. Units: those of the scenario.
+    pub(crate) fn held_pose(&self, support: usize) -> Option<Pose> {
+        let held = self.scenario.supports.get(support)?;
+        Some(Pose {
+            frame: held.frame().unwrap_or_else(Matrix3::identity),
+            position: held.point()?,
+        })
     }
 
     /// The method of solution.

@@ -32,7 +32,7 @@ use crate::strip::density::{Density, LANES, Motions};
 use crate::strip::developable::DevelopableEnergy;
 use crate::strip::element::Element;
 use crate::strip::shell::{FIELDS, Shell};
-use nalgebra::{Rotation3, SVector, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{SVector, UnitQuaternion, Vector3, Vector6};
 use num_dual::DualNum;
 use stagewise::{Distance, NodeVector};
 
@@ -545,14 +545,9 @@ impl<D: Density<F>, const F: usize, const N: usize> BeltProgram<D, F, N> {
         shares[end].generalised_force(&point.poses[piece + end])
     }
 
-    /// Moves a support that holds a node by position and frame.
+    /// Moves a support, as [`NodeSupport::move_to`].
     pub(crate) fn move_support(&mut self, support: usize, pose: &Pose) {
-        let [x, y, z] = pose.position.into();
-        let frame =
-            UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(pose.frame));
-        let support = &mut self.supports[support];
-        support.position = [Some(x), Some(y), Some(z)];
-        support.hold = Hold::Frame(frame);
+        self.supports[support].move_to(pose);
     }
 
     /// Force and moment of every support on the belt, world axes, about the support's point.

@@ -159,12 +159,15 @@ fn test_position_and_rotation_vector_are_refused_as_by_a_scenario() {
         support.rotation = Some(rotation.into());
         (support.euler, support.quaternion) = (None, None);
         let refused = scenario.validate().unwrap_err();
-        let checked = problem().check_support_pose(1, &position, &rotation);
+        let checked = problem().check_support_pose(1, Some(&position), Some(&rotation));
         assert_eq!(checked, Err(refused));
     }
     let turned = Vector3::new(0.0, 7.0, 0.0);
-    assert_eq!(problem().check_support_pose(1, &here, &turned), Ok(()));
-    assert!(problem().check_support_pose(2, &here, &turned).is_err());
+    assert_eq!(
+        problem().check_support_pose(1, Some(&here), Some(&turned)),
+        Ok(())
+    );
+    assert!(problem().check_support_pose(2, Some(&here), None).is_err());
 }
 
 #[test]

@@ -17,9 +17,9 @@ pub struct Followed {
     pub jump: f64,
     /// Fall of the objective in all jumps.
     pub released: f64,
-    /// Whether the end of the way was reached; if not, the point is the last minimum on the way.
+    /// Whether the end of the way was reached.
     pub arrived: bool,
-    /// Share of the way up to which the minimum was followed.
+    /// Share of the way up to which the minimum was followed: the programme and the point are there.
     pub reached: f64,
 }
 
@@ -30,7 +30,7 @@ pub struct Follower<P: Program<X, U, N>, const X: usize, const U: usize, const N
     settings: FollowSettings,
     /// The last minimum on the way.
     last: Stationary<P::Point>,
-    /// The minimum from which the way began.
+    /// The minimum to return to.
     first: Stationary<P::Point>,
     /// Room for the gradients of the equalities at nodes.
     gradients: Vec<NodeVector<N>>,
@@ -118,9 +118,9 @@ where
 
     /// Follows the minimum while `change` takes the programme along a way of a `length`, from share 0 to share 1: in one
     /// stride, or in shorter strides where a stride might lose the minimum. Where the minimum ends, the next minimum downhill
-    /// takes its place. The programme ends at share 1.
+    /// takes its place. Where the minimum is lost, or on `Break`, the programme ends at the share of the last minimum.
     ///
-    /// `proceed` is called once a stride, and interrupts by `Break`.
+    /// `proceed` is called once a Newton step, and interrupts by `Break`.
     pub fn follow(
         &mut self,
         length: f64,
@@ -142,11 +142,10 @@ where
         };
         let hidden = self.settings.smallest_jump / (SMOOTH * length);
         let shortest = hidden.clamp(SHORTEST_STRIDES[0], SHORTEST_STRIDES[1]);
-        self.first.copy_from(&self.last);
         while way.done < 1.0 && way.leaps < MOST_LEAPS && proceed().is_continue() {
             let next = (way.done + way.stride).min(1.0);
             change(&mut self.iterate.program, next);
-            let (iterations, kept) = self.stride();
+            let (iterations, kept) = self.stride(proceed);
             way.iterations += iterations;
             let arrived = kept || {
                 self.go_back();
@@ -162,7 +161,10 @@ where
                 way.stride *= 0.25;
             }
         }
-        change(&mut self.iterate.program, 1.0);
+        if way.done < 1.0 {
+            change(&mut self.iterate.program, way.done);
+            self.go_back();
+        }
         Followed {
             iterations: way.iterations,
             residuals: self.iterate.residuals(),
@@ -225,7 +227,7 @@ where
             .program
             .evaluate(&mut iterate.point, &mut iterate.values);
         iterate.linearise();
-        let (_, kept) = self.correct(f64::INFINITY);
+        let (_, kept) = self.correct(f64::INFINITY, &mut || ControlFlow::Continue(()));
         admissible && kept
     }
 
@@ -250,7 +252,12 @@ where
         solution
     }
 
-    /// Returns to the minimum at the start of the last way; `change` sets the programme back.
+    /// Makes the present minimum the one to return to.
+    pub fn depart(&mut self) {
+        self.first.copy_from(&self.last);
+    }
+
+    /// Returns to the minimum of the last departure; `change` sets the programme back.
     pub fn return_to_start(&mut self, change: impl FnOnce(&mut P)) {
         change(&mut self.iterate.program);
         self.last.copy_from(&self.first);
@@ -258,7 +265,7 @@ where
     }
 
     /// Predictor, then corrector; gives the count of steps, and whether the minimum was kept.
-    fn stride(&mut self) -> (usize, bool) {
+    fn stride(&mut self, proceed: &mut dyn FnMut() -> ControlFlow<()>) -> (usize, bool) {
         let iterate = &mut self.iterate;
         let admissible = iterate
             .program
@@ -289,14 +296,18 @@ where
             return (1, false);
         };
         iterate.linearise();
-        let (steps, kept) = self.correct(left(taken, 1.0) * predicted);
+        let (steps, kept) = self.correct(left(taken, 1.0) * predicted, proceed);
         (steps + 1, kept)
     }
 
     /// Newton steps until all residuals are within the tolerance. False where the steps do not contract, the first against
-    /// the expected length, or where the point is no minimum. The factorisation at the last point decides whether the point
+    /// the expected length, where the point is no minimum, or on `Break`. The factorisation at the last point decides whether the point
     /// is a minimum, and serves the next predictor.
-    fn correct(&mut self, expected: f64) -> (usize, bool) {
+    fn correct(
+        &mut self,
+        expected: f64,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> (usize, bool) {
         /// Largest count of Newton steps of one correction; a number.
         const CORRECTIONS: usize = 12;
         /// Ratio of successive Newton steps up to which they converge; dimensionless.
@@ -311,6 +322,9 @@ where
             let iterate = &mut self.iterate;
             if iterate.residuals().largest() <= self.settings.tolerance {
                 return (steps, true);
+            }
+            if proceed().is_break() {
+                return (steps, false);
             }
             iterate.find_step();
             let now = size(iterate);

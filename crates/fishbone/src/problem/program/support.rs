@@ -294,6 +294,30 @@ impl NodeSupport {
         Some(Vector3::new(x?, y?, z?))
     }
 
+    /// The pose that is held; `None` unless all of it is.
+    pub(crate) fn pose(&self) -> Option<Pose> {
+        let Hold::Frame(frame) = self.hold else {
+            return None;
+        };
+        Some(Pose {
+            frame: frame.to_rotation_matrix().into_inner(),
+            position: self.point()?,
+        })
+    }
+
+    /// Holds another position, all of it, and, where it holds a frame, that of a pose.
+    pub(crate) fn move_to(&mut self, pose: &Pose) {
+        let [x, y, z] = pose.position.into();
+        self.position = [Some(x), Some(y), Some(z)];
+        match &mut self.hold {
+            Hold::Free => (),
+            Hold::Frame(frame) | Hold::Hinge { frame, .. } => {
+                let turn = Rotation3::from_matrix_unchecked(pose.frame);
+                *frame = UnitQuaternion::from_rotation_matrix(&turn);
+            }
+        }
+    }
+
     /// The components of a vector along which the position is held.
     pub(crate) fn held(&self, vector: &Vector3<f64>) -> Vector3<f64> {
         Vector3::from_fn(|i, _| {

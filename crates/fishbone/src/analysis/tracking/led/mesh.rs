@@ -13,7 +13,7 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
     /// equilibrium of its mesh alone.
     pub(super) fn follow_error(
         &mut self,
-        way: &mut Way,
+        way: &mut Way<Self>,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Status {
         /// Change within an element over that of the last estimate from which the error is estimated again, dimensionless.
@@ -48,12 +48,12 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
     /// The present equilibrium on a mesh that carries it; `None` where its own mesh does, or where there is no other.
     fn on_mesh_that_carries(
         &mut self,
-        way: &mut Way,
+        way: &mut Way<Self>,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Option<Equilibrium> {
         /// Largest displacement of a node from mesh to mesh, in U: beyond, the shape is another one.
         const SAME_BELT: f64 = 1e-2;
-        let problem = self.problem_at(&self.pose).ok()?;
+        let problem = self.present_problem();
         let at = self.follower.solution().at;
         let (own, objective) = (self.follower.program(), self.follower.values().objective);
         if D::carries(&problem, own, &at, objective) {

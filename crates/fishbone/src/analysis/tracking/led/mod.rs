@@ -1,35 +1,33 @@
-//! An equilibrium of any model of the strip, led by one of its supports.
+//! An equilibrium of any model of the strip, led by some of its supports.
 
+mod lead;
 mod mesh;
 #[cfg(feature = "io")]
 mod stored;
 mod way;
 
-use super::{NoTracker, Update};
-use crate::equilibrium::model::{StripModel, snapped_from};
-use crate::equilibrium::{Equilibrium, Solved, Status, flat_pose, from_guess, largest_change};
-use crate::geometry::{Pose, Wrench, exp, log};
+use super::{Goal, NoTracker, Update};
+use crate::equilibrium::model::StripModel;
+use crate::equilibrium::{Equilibrium, Flat, Solved, Status, largest_change};
+use crate::geometry::{Pose, Wrench, exp};
 use crate::problem::program::{BeltPoint, BeltProgram};
-use crate::problem::{Mesh, Problem, Units};
+use crate::problem::{Problem, Units};
 use crate::scenario::error::ScenarioError;
 use crate::scenario::{Scenario, SegmentSpec, SupportSpec};
 use nalgebra::{SVector, Vector3};
-use stagewise::{Distance, FollowSettings, Follower, Program, Solution, Stationary};
+use stagewise::{FollowSettings, Follower, Solution, Stationary};
 use std::ops::ControlFlow;
-use way::{Way, distance};
+use way::Way;
 
-/// Most changes of the active edges, or attempts of one, on the way to a pose, a number.
-const SWITCHES: usize = 40;
-
-/// Distance past the loss of an equilibrium at which the belt is let go downhill, in U and rad.
-const PAST: f64 = 1e-5;
-
-/// An equilibrium of a model of the strip and the support that moves.
+/// An equilibrium of a model of the strip and the supports that move.
 #[derive(Clone)]
 pub(super) struct Led<D: StripModel<F, N>, const F: usize, const N: usize> {
     /// The problem at the tracker's start.
     problem: Problem,
-    support: usize,
+    /// The supports that move, by their places in the scenario.
+    moving: Vec<usize>,
+    /// Their present poses, in the units of the programme.
+    poses: Vec<Pose>,
     follower: Follower<BeltProgram<D, F, N>, 6, F, N>,
     /// Whether the mesh is graded anew on the way.
     is_graded_anew: bool,
@@ -37,12 +35,12 @@ pub(super) struct Led<D: StripModel<F, N>, const F: usize, const N: usize> {
     watched: f64,
     /// Fields at the nodes when the shape was last seen to be an equilibrium of the belt, and not of its mesh alone.
     sound: Vec<SVector<f64, F>>,
-    /// Present pose of the support, in the units of the programme.
-    pose: Pose,
-    /// Pose of the support at which the board lies flat and at rest, in the units of the programme.
-    flat: Option<Pose>,
+    /// The board as it lies flat and at rest.
+    flat: Option<Flat>,
     /// Difference between the scenario's potential and the programme's, for their origins.
     potential_of_origin: f64,
+    /// Room for the way of an update.
+    way: Way<Self>,
 }
 
 impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
@@ -50,32 +48,36 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
     pub(super) fn new(
         equilibrium: &Equilibrium,
         solved: &Solved<D, F, N>,
-        support: usize,
+        moving: &[usize],
     ) -> Result<Self, NoTracker> {
         let problem = equilibrium.problem.clone();
-        if support >= problem.scenario().supports.len() {
-            return Err(NoTracker::NoSupport(support));
-        }
-        let Pose { frame, position } = problem
-            .clamp(support)
-            .ok_or(NoTracker::NotClamped(support))?;
-        let follower = Self::follower(&problem, solved.program.clone(), &solved.at)?;
         let (units, origin) = (problem.units(), problem.origin());
+        let pose_of = |support: &usize| {
+            if *support >= problem.scenario().supports.len() {
+                return Err(NoTracker::NoSupport(*support));
+            }
+            let held = problem.held_pose(*support);
+            let Pose { frame, position } = held.ok_or(NoTracker::NotHeld(*support))?;
+            Ok(Pose {
+                frame,
+                position: (position - origin) / units.length,
+            })
+        };
+        let poses = moving.iter().map(pose_of).collect::<Result<_, _>>()?;
+        let follower = Self::follower(&problem, solved.program.clone(), &solved.at)?;
         let (program, point) = (&solved.program, &solved.at.point);
         let stored = program.elastic_energy(&point.fields) + program.load_potential(&point.poses);
         Ok(Self {
-            support,
+            moving: moving.to_vec(),
+            poses,
             is_graded_anew: D::is_graded_anew(&problem),
             watched: largest_change(program, point),
             sound: Vec::new(),
-            pose: Pose {
-                frame,
-                position: (position - origin) / units.length,
-            },
-            flat: flat_pose(&problem, &solved.program, support),
+            flat: Flat::of(&solved.program),
             potential_of_origin: equilibrium.energy - stored * units.energy,
             problem,
             follower,
+            way: Way::default(),
         })
     }
 
@@ -93,9 +95,9 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
         Follower::new(program, settings, minimum).ok_or(NoTracker::Marginal)
     }
 
-    /// As [`Tracker::support`](super::Tracker::support).
-    pub(super) fn support(&self) -> usize {
-        self.support
+    /// As [`Tracker::moving`](super::Tracker::moving).
+    pub(super) fn moving(&self) -> &[usize] {
+        &self.moving
     }
 
     /// As [`Tracker::supports`](super::Tracker::supports).
@@ -108,371 +110,158 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
     /// As [`Tracker::update`](super::Tracker::update).
     pub(super) fn update(
         &mut self,
-        position: &Vector3<f64>,
-        rotation: &Vector3<f64>,
+        goals: &[Goal],
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Result<Update, ScenarioError> {
-        let from = self.pose;
-        self.check_pose(position, rotation)?;
-        let goal = Pose {
-            frame: exp(rotation),
-            position: (position - self.problem.origin()) / self.units().length,
+        self.check(goals)?;
+        let mut is_stopped = false;
+        let proceed = &mut || {
+            is_stopped = is_stopped || proceed().is_break();
+            match is_stopped {
+                true => ControlFlow::Break(()),
+                false => ControlFlow::Continue(()),
+            }
         };
-        let mut way = Way::new(from, goal);
-        let mut status = match self.is_out_of_reach(&goal) {
+        let mut way = std::mem::take(&mut self.way);
+        way.begin(&self.poses, self.goal_poses(goals));
+        self.follower.depart();
+        let mut status = match self.is_out_of_reach(&way) {
             true => Status::Infeasible,
             false => self.lead(&mut way, proceed),
         };
-        if status == Status::Converged {
-            status = self.follow_error(&mut way, proceed);
-            if status != Status::Converged && way.start.is_none() {
-                self.pose = from;
-                self.return_to_start();
-            }
-        }
-        if status != Status::Converged {
-            (way.jump, way.released) = (0.0, 0.0);
-            if let Some(start) = way.start {
-                self.restart(&start);
+        if way.reached > 0.0 {
+            let carried = self.follow_error(&mut way, proceed);
+            if carried != Status::Converged {
+                status = carried;
+                self.return_to_start_of(&mut way);
             }
         }
         let units = self.units();
-        Ok(Update {
+        let update = Update {
             status,
-            message: self.message(status, &goal),
+            message: self.message(status, &way, is_stopped),
+            fraction: match status {
+                Status::Converged => 1.0,
+                _ => way.reached,
+            },
             solved_afresh: way.solved_afresh && status == Status::Converged,
+            taut: self.is_taut(),
             snapped: way.jump > 0.0,
             jump: way.jump * units.length,
             released: way.released * units.energy,
             energy: self.energy(),
             iterations: way.iterations,
             residuals: self.follower.residuals(),
+        };
+        way.start = None;
+        self.way = way;
+        Ok(update)
+    }
+
+    /// Poses that the moving supports are to take, in the units of the programme.
+    fn goal_poses(&self, goals: &[Goal]) -> impl Iterator<Item = Pose> {
+        let supports = &self.follower.program().supports;
+        let moving = self.moving.iter().zip(&self.poses);
+        moving.map(|(support, pose)| {
+            let turns = supports[*support].hold.frame().is_some();
+            let of_support = goals.iter().filter(|goal| goal.support == *support);
+            of_support.fold(*pose, |pose, goal| Pose {
+                frame: match goal.rotation.filter(|_| turns) {
+                    Some(rotation) => exp(&rotation),
+                    None => pose.frame,
+                },
+                position: goal.position.map_or(pose.position, |position| {
+                    (position - self.problem.origin()) / self.units().length
+                }),
+            })
         })
     }
 
-    /// Why a pose was not reached, for people; empty where it was.
-    fn message(&self, status: Status, goal: &Pose) -> String {
-        let too_far = || self.problem_at(goal).ok()?.unreachable_supports();
+    /// Why goals were not reached, for people; empty where they were.
+    fn message(&self, status: Status, way: &Way<Self>, is_stopped: bool) -> String {
+        let too_far = || self.problem_at(way.poses(1.0)).ok()?.unreachable_supports();
         match status {
             Status::Converged => String::new(),
             Status::Infeasible => too_far().map_or_else(
-                || "no shape of the belt meets the supports at this pose".to_owned(),
+                || "no shape of the belt meets the supports there".to_owned(),
                 |too_far| too_far.to_string(),
             ),
+            Status::NotConverged if is_stopped && way.reached > 0.0 => {
+                "stopped on the way: update again to go on".to_owned()
+            }
+            Status::NotConverged if is_stopped => {
+                "stopped before the next equilibrium on the way: allow more to go on".to_owned()
+            }
             Status::NotConverged => {
-                "no minimum was found on the way to this pose, nor at it: move there in smaller steps"
+                "no minimum was found farther on the way, nor at its end: move there in smaller steps"
                     .to_owned()
             }
         }
     }
 
-    /// As [`Tracker::check_pose`](super::Tracker::check_pose).
-    pub(super) fn check_pose(
-        &self,
-        position: &Vector3<f64>,
-        rotation: &Vector3<f64>,
-    ) -> Result<(), ScenarioError> {
-        self.problem
-            .check_support_pose(self.support, position, rotation)
+    /// As [`Tracker::check`](super::Tracker::check).
+    pub(super) fn check(&self, goals: &[Goal]) -> Result<(), ScenarioError> {
+        goals.iter().try_for_each(|goal| {
+            if !self.moving.contains(&goal.support) {
+                return Err(ScenarioError::invalid(
+                    format!("supports[{}]", goal.support),
+                    "a support that does not move",
+                    "the supports that the tracker moves",
+                ));
+            }
+            let (position, rotation) = (goal.position.as_ref(), goal.rotation.as_ref());
+            self.problem
+                .check_support_pose(goal.support, position, rotation)
+        })
     }
 
-    /// Whether a pose is proved to be out of reach. The proof is only tried where the belt is nearly straight to another support.
-    fn is_out_of_reach(&self, pose: &Pose) -> bool {
-        /// Distance over the flexible length of the belt in between from which the proof is tried.
+    /// Whether the end of a way is proved to be out of reach. The proof is only tried where the belt is nearly straight there.
+    fn is_out_of_reach(&self, way: &Way<Self>) -> bool {
+        let poses = way.poses(1.0);
+        self.is_nearly_straight(poses.clone())
+            && self
+                .problem_at(poses)
+                .is_ok_and(|problem| problem.unreachable_supports().is_some())
+    }
+
+    /// Whether the shape leaves reactions open. This is only tried where the belt is nearly straight.
+    fn is_taut(&self) -> bool {
+        self.is_nearly_straight(self.poses.iter().copied())
+            && self.follower.program().undetermined(self.point()).is_some()
+    }
+
+    /// Whether the belt is nearly straight from a moving support, at a given pose, to any other support.
+    fn is_nearly_straight(&self, poses: impl Iterator<Item = Pose> + Clone) -> bool {
+        /// Distance over the flexible length of the belt in between.
         const NEARLY: f64 = 0.9;
         let Scenario { belt, supports, .. } = self.problem.scenario();
         let length = belt.length();
-        let own = supports[self.support].at.arc_length(length);
-        let stiff = belt
-            .segments
-            .iter()
-            .filter(|s| matches!(s, SegmentSpec::Rigid { .. }));
+        let rigid = |segment: &&SegmentSpec| matches!(segment, SegmentSpec::Rigid { .. });
+        let stiff = belt.segments.iter().filter(rigid);
         let stiff: f64 = stiff.map(SegmentSpec::length).sum();
-        let position = self.in_scenario(pose).position;
-        let is_nearly_straight = |other: &SupportSpec| {
-            let way = (other.at.arc_length(length) - own).abs();
+        let held = |support: usize| {
+            let mut moving = self.moving.iter().zip(poses.clone());
+            let moved = moving.find_map(|(i, pose)| (*i == support).then_some(pose));
+            match moved {
+                Some(pose) => self.in_scenario(&pose).position.data.0[0].map(Some),
+                None => supports[support].components(),
+            }
+        };
+        let is_nearly_straight = |from: usize, to: usize| {
+            let [start, end] = [from, to].map(|support| supports[support].at.arc_length(length));
+            let way = (end - start).abs();
             let between = if belt.closed {
                 way.min(length - way)
             } else {
                 way
             };
-            let along = |k: usize| other.components()[k].map_or(0.0, |held| held - position[k]);
+            let (from, to) = (held(from), held(to));
+            let along = |k: usize| to[k].zip(from[k]).map_or(0.0, |(to, from)| to - from);
             Vector3::from_fn(|k, _| along(k)).norm() > NEARLY * (between - stiff)
         };
-        let mut others = supports.iter().enumerate();
-        others.any(|(i, other)| i != self.support && is_nearly_straight(other))
-            && self
-                .problem_at(pose)
-                .is_ok_and(|problem| problem.unreachable_supports().is_some())
-    }
-
-    /// Leads the support along a way. Next to the pose at which the board lies flat no tangent leads on: there it is solved.
-    fn lead(&mut self, way: &mut Way, proceed: &mut dyn FnMut() -> ControlFlow<()>) -> Status {
-        /// Length of a way without motion, in U and rad.
-        const NOWHERE: f64 = 1e-12;
-        let Some([from, to]) = self.beside_flat(way) else {
-            return self.lead_along(way, proceed);
-        };
-        self.remember_start(way);
-        let ends = [from, to, 1.0].map(|share| way.pose(share));
-        for (leg, end) in ends.into_iter().enumerate() {
-            way.redirect(self.pose, end);
-            let is_solved = leg == 1 && self.solve_beside_flat(way, proceed);
-            if is_solved || way.length() <= NOWHERE {
-                continue;
-            }
-            let status = self.lead_along(way, proceed);
-            if status != Status::Converged {
-                return status;
-            }
-        }
-        Status::Converged
-    }
-
-    /// Leads the support along a way as far as a tangent leads on. Where the ribs come to other edges, the belt is followed up
-    /// to the place, and goes on with these.
-    fn lead_along(
-        &mut self,
-        way: &mut Way,
-        proceed: &mut dyn FnMut() -> ControlFlow<()>,
-    ) -> Status {
-        let support = self.support;
-        let (mut done, mut ahead) = (0.0, 1.0);
-        for _ in 0..SWITCHES {
-            if self.is_graded_anew
-                && let Some(reached) = self.go_on_anew_graded(done, way, proceed)
-            {
-                done = reached;
-                if done >= 1.0 {
-                    return Status::Converged;
-                }
-            }
-            let mut change = |program: &mut BeltProgram<D, F, N>, share: f64| {
-                program.move_support(support, &way.pose(done + share * (ahead - done)));
-            };
-            let length = way.length() * (ahead - done);
-            let followed = self.follower.follow(length, &mut change, proceed);
-            way.iterations += followed.iterations;
-            if !followed.arrived {
-                self.return_to_start();
-                self.remember_start(way);
-                if followed.reached * length > PAST {
-                    ahead = done + followed.reached * (ahead - done);
-                    continue;
-                }
-                let past = (done + PAST / way.length()).min(1.0);
-                let shape = self.point().clone();
-                if !self.snap_to(&shape, &way.pose(past), way, proceed) {
-                    break;
-                }
-                if past >= 1.0 {
-                    return Status::Converged;
-                }
-                (done, ahead) = (past, 1.0);
-                continue;
-            }
-            if self.is_settled() {
-                self.pose = way.pose(ahead);
-                if ahead >= 1.0 {
-                    return Status::Converged;
-                }
-                (done, ahead) = (ahead, 1.0);
-                continue;
-            }
-            let beyond = self.follower.point().clone();
-            self.return_to_start();
-            self.remember_start(way);
-            if !self.switch_to_edges_of(&beyond, way, proceed) {
-                ahead = 0.5 * (done + ahead);
-            }
-        }
-        self.solve_at(way, proceed)
-    }
-
-    /// Leads a slender belt on from a share of a way by a search on a mesh graded anew: on nodes that stay, each place where its
-    /// ribs turn passes from element to element, which takes many steps. Gives the share of the way that is reached; `None`
-    /// where the search finds no minimum that is surely of the same branch.
-    fn go_on_anew_graded(
-        &mut self,
-        done: f64,
-        way: &mut Way,
-        proceed: &mut dyn FnMut() -> ControlFlow<()>,
-    ) -> Option<f64> {
-        /// Parts of the way that are tried in turn, as shares of what is left.
-        const PARTS: [f64; 3] = [1.0, 0.5, 0.25];
-        for part in PARTS {
-            let ahead = if part < 1.0 {
-                done + part * (1.0 - done)
-            } else {
-                1.0
-            };
-            let problem = self.problem_at(&way.pose(ahead)).ok()?;
-            let (program, from) = (self.follower.program(), self.follower.point());
-            let found = D::minimum_graded_anew(&problem, program, from, proceed)?;
-            way.iterations += found.iterations;
-            self.remember_start(way);
-            if self.is_smooth_way(&found, [done, ahead], way) && self.restart(&found) {
-                self.pose = way.pose(ahead);
-                return Some(ahead);
-            }
-        }
-        None
-    }
-
-    /// Whether a minimum at the end of a part of a way, given by its shares, is of the present branch: its energy differs from
-    /// the present one by the work of the support. A snap releases energy.
-    fn is_smooth_way(&self, found: &Equilibrium, [done, ahead]: [f64; 2], way: &Way) -> bool {
-        /// Energy released over the work of force and moment, each without its sign, up to which the way is smooth; dimensionless.
-        const RELEASED: f64 = 0.01;
-        if found.status != Status::Converged {
-            return false;
-        }
-        let [start, end] = [done, ahead].map(|share| self.in_scenario(&way.pose(share)));
-        let moved = end.position - start.position;
-        let turned = log(&(end.frame * start.frame.transpose()));
-        let wrenches = [
-            self.reaction(self.support),
-            found.reactions[self.support].wrench,
-        ];
-        // By the trapezoidal rule, off by the third power of the way.
-        let [work, most] = [0, 1].map(|i| {
-            let of_wrench = |wrench: &Wrench| {
-                let (force, moment) = (&wrench.force, &wrench.moment);
-                match i {
-                    0 => force.dot(&moved) + moment.dot(&turned),
-                    _ => force.norm() * moved.norm() + moment.norm() * turned.norm(),
-                }
-            };
-            0.5 * wrenches.iter().map(of_wrench).sum::<f64>()
-        });
-        let released = self.energy() + work - found.energy;
-        let by_meshes = self.problem.accuracy() * found.elastic_energy;
-        released.abs() <= RELEASED * (most + by_meshes)
-    }
-
-    /// The part of a way, from share to share, on which the board is solved beside its flat shape: the first part where it is
-    /// nearly flat now, the last where the way ends there; `None` of other ways.
-    fn beside_flat(&self, way: &Way) -> Option<[f64; 2]> {
-        /// Distance to the pose at which the board is flat from which its shape is near to flat, in U and rad.
-        const NEAR: f64 = 0.01;
-        /// Elastic energy of such a board, in mean R_f/U.
-        const ENERGY: f64 = 0.1;
-        let flat = self.flat.as_ref()?;
-        let is_near = |pose: &Pose| distance(pose, flat) <= 0.5 * NEAR;
-        let part = NEAR / way.length();
-        let size = self.follower.program().size(self.point());
-        match (is_near(&way.from) && size <= ENERGY, is_near(&way.goal)) {
-            (true, false) => Some([0.0, part.min(1.0)]),
-            (true, true) => Some([0.0, 1.0]),
-            (false, true) => Some([(1.0 - part).max(0.0), 1.0]),
-            (false, false) => None,
-        }
-    }
-
-    /// Solves at the end of a way beside the flat shape; false where this finds no shape near by that can be followed.
-    fn solve_beside_flat(
-        &mut self,
-        way: &mut Way,
-        proceed: &mut dyn FnMut() -> ControlFlow<()>,
-    ) -> bool {
-        let Ok(problem) = self.problem_at(&way.goal) else {
-            return false;
-        };
-        let found = from_guess(&problem, proceed);
-        way.iterations += found.iterations;
-        self.remember_start(way);
-        let moved = self.present(D::of_solution_on_mesh).displacement(&found);
-        // A belt that is shortened by the square of a length leaves its flat shape by much this length.
-        moved <= way.length().sqrt() + self.problem.snap_size() && self.restart(&found)
-    }
-
-    fn remember_start(&mut self, way: &mut Way) {
-        if way.start.is_none() {
-            way.start = Some(self.present(D::of_solution_on_mesh));
-        }
-    }
-
-    /// Takes the active edges of a shape near by; false where these are not right for the present shape.
-    fn switch_to_edges_of(
-        &mut self,
-        shape: &BeltPoint<F>,
-        way: &mut Way,
-        proceed: &mut dyn FnMut() -> ControlFlow<()>,
-    ) -> bool {
-        let Ok(problem) = self.problem_at(&self.pose) else {
-            return false;
-        };
-        let mut program = self.follower.program().clone();
-        D::choose_active_sets(&problem, &mut program, shape);
-        let mesh = Mesh::of(&problem, &program);
-        let found = D::minimum_next_to(&problem, &mesh, self.follower.point(), proceed);
-        way.iterations += found.iterations;
-        let is_near = |solved: &Solved<D, F, N>| {
-            solved.program.edges == program.edges
-                && solved.at.point.distance(self.follower.point()) <= problem.snap_size()
-        };
-        found.certified().is_ok_and(is_near) && self.restart(&found)
-    }
-
-    /// Snaps to the minimum downhill from a shape, with the active edges that are right there; false where there is none.
-    fn snap_to(
-        &mut self,
-        shape: &BeltPoint<F>,
-        pose: &Pose,
-        way: &mut Way,
-        proceed: &mut dyn FnMut() -> ControlFlow<()>,
-    ) -> bool {
-        let Ok(problem) = self.problem_at(pose) else {
-            return false;
-        };
-        let mesh = Mesh::of(&problem, self.follower.program());
-        let found = snapped_from::<D, F, N>(&problem, &mesh, shape, proceed);
-        found.is_some_and(|found| self.take(&found, way))
-    }
-
-    /// Solves at the end of a way on which the belt could not be followed.
-    fn solve_at(&mut self, way: &mut Way, proceed: &mut dyn FnMut() -> ControlFlow<()>) -> Status {
-        let goal = way.goal;
-        let Ok(problem) = self.problem_at(&goal) else {
-            self.return_to_start();
-            return Status::Infeasible;
-        };
-        let mesh = Mesh::of(&problem, self.follower.program());
-        let found = D::solve_near(&problem, &mesh, self.follower.point(), proceed);
-        way.solved_afresh = true;
-        match self.take(&found, way) {
-            true => Status::Converged,
-            false if found.status == Status::Infeasible => Status::Infeasible,
-            false => Status::NotConverged,
-        }
-    }
-
-    /// Takes over an equilibrium to which the belt has gone; false where there is none to follow.
-    fn take(&mut self, found: &Equilibrium, way: &mut Way) -> bool {
-        way.iterations += found.iterations;
-        let (energy, before) = (self.energy(), self.point().clone());
-        if !self.restart(found) {
-            self.return_to_start();
-            return false;
-        }
-        let jump = self.point().distance(&before);
-        let released = energy - self.energy();
-        if self.problem.is_snap(jump, released, found.elastic_energy) {
-            way.add(jump, released / self.units().energy);
-        }
-        true
-    }
-
-    fn restart(&mut self, found: &Equilibrium) -> bool {
-        let other = found.certified().ok();
-        match other.and_then(|solved| Self::new(found, solved, self.support).ok()) {
-            Some(other) => {
-                let watched = self.watched.max(other.watched);
-                *self = Self { watched, ..other };
-                true
-            }
-            None => false,
-        }
+        let mut moving = self.moving.iter();
+        moving
+            .any(|from| (0..supports.len()).any(|to| to != *from && is_nearly_straight(*from, to)))
     }
 
     fn is_settled(&self) -> bool {
@@ -480,10 +269,12 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
         D::active_set_fault(&self.problem, program, point).is_none()
     }
 
+    /// Returns to the minimum of the last departure.
     fn return_to_start(&mut self) {
-        let (support, pose) = (self.support, self.pose);
-        self.follower
-            .return_to_start(|program| program.move_support(support, &pose));
+        let moving = self.moving.iter().zip(&self.poses);
+        self.follower.return_to_start(|program| {
+            moving.for_each(|(support, pose)| program.move_support(*support, pose));
+        });
     }
 
     fn units(&self) -> Units {
@@ -498,12 +289,18 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
         }
     }
 
-    /// The problem with the support at another pose. The programme keeps its origin, even if the origin is the moving
-    /// support.
-    fn problem_at(&self, pose: &Pose) -> Result<Problem, ScenarioError> {
-        let pose = self.in_scenario(pose);
-        let moved = self.problem.with_support_pose(self.support, &pose)?;
+    /// The problem with the moving supports at other poses. The programme keeps its origin, even if the origin is one of them.
+    fn problem_at(&self, poses: impl Iterator<Item = Pose>) -> Result<Problem, ScenarioError> {
+        let poses = poses.map(|pose| self.in_scenario(&pose));
+        let moved = self.moving.iter().copied().zip(poses);
+        let moved = self.problem.with_support_poses(moved)?;
         Ok(moved.about(self.problem.origin()))
+    }
+
+    /// The problem with the moving supports at their present poses.
+    fn present_problem(&self) -> Problem {
+        let problem = self.problem_at(self.poses.iter().copied());
+        problem.expect("the poses were checked before the belt was led there")
     }
 
     /// As [`Tracker::equilibrium`](super::Tracker::equilibrium).
@@ -516,8 +313,7 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
         &mut self,
         of: fn(&Problem, BeltProgram<D, F, N>, Solution<BeltPoint<F>>) -> Equilibrium,
     ) -> Equilibrium {
-        let problem = self.problem_at(&self.pose);
-        let problem = problem.expect("the pose was checked before the belt was led there");
+        let problem = self.present_problem();
         let solution = self.follower.solution();
         of(&problem, self.follower.program().clone(), solution)
     }

@@ -1,6 +1,8 @@
 //! A led equilibrium as data: what its follower finds again by itself is left out.
 
 use super::Led;
+use super::way::Way;
+use crate::equilibrium::Flat;
 use crate::equilibrium::model::StripModel;
 use crate::geometry::Pose;
 use crate::problem::Problem;
@@ -12,15 +14,15 @@ use stagewise::Stationary;
 
 /// The data of a [`Led`], borrowed to be written or owned once read.
 #[derive(Serialize, Deserialize)]
-struct Stored<B, P, A, S> {
+struct Stored<B, P, A, M, O, S, L> {
     problem: B,
     program: P,
     at: A,
-    support: usize,
+    moving: M,
+    poses: O,
     watched: f64,
     sound: S,
-    pose: Pose,
-    flat: Option<Pose>,
+    flat: L,
     potential_of_origin: f64,
 }
 
@@ -33,11 +35,11 @@ where
             problem: &self.problem,
             program: self.follower.program(),
             at: self.follower.minimum(),
-            support: self.support,
+            moving: &self.moving,
+            poses: &self.poses,
             watched: self.watched,
             sound: &self.sound,
-            pose: self.pose,
-            flat: self.flat,
+            flat: &self.flat,
             potential_of_origin: self.potential_of_origin,
         };
         stored.serialize(serializer)
@@ -53,19 +55,23 @@ where
             Problem,
             BeltProgram<D, F, N>,
             Stationary<BeltPoint<F>>,
+            Vec<usize>,
+            Vec<Pose>,
             Vec<SVector<f64, F>>,
+            Option<Flat>,
         > = Deserialize::deserialize(deserializer)?;
         let follower = Self::follower(&stored.problem, stored.program, &stored.at);
         Ok(Self {
             follower: follower.map_err(R::Error::custom)?,
             is_graded_anew: D::is_graded_anew(&stored.problem),
             problem: stored.problem,
-            support: stored.support,
+            moving: stored.moving,
+            poses: stored.poses,
             watched: stored.watched,
             sound: stored.sound,
-            pose: stored.pose,
             flat: stored.flat,
             potential_of_origin: stored.potential_of_origin,
+            way: Way::default(),
         })
     }
 }

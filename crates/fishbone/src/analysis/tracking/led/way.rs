@@ -1,19 +1,18 @@
-//! The way of a tracker's support in one update.
+//! The way of a tracker's supports in one update.
 
-use crate::equilibrium::Equilibrium;
 use crate::geometry::{Pose, exp};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
-/// A way of the support from pose to pose, and what has happened on it.
-pub(super) struct Way {
-    pub(super) from: Pose,
-    pub(super) goal: Pose,
-    /// Turn of the support, in its own axes.
-    pub(super) turn: Vector3<f64>,
-    /// The equilibrium at its start, once the belt has been led on in parts.
-    pub(super) start: Option<Equilibrium>,
+/// A way of supports from pose to pose, and what has happened on it.
+#[derive(Clone)]
+pub(super) struct Way<L> {
+    legs: Vec<Leg>,
+    /// Share of the way that the belt has been led.
+    pub(super) reached: f64,
+    /// The belt at the start, once it has been led on in parts.
+    pub(super) start: Option<Box<L>>,
     pub(super) iterations: usize,
-    /// Whether the problem at its end was solved afresh.
+    /// Whether the problem at the end was solved afresh.
     pub(super) solved_afresh: bool,
     /// Largest displacement of a node in a snap, in U.
     pub(super) jump: f64,
@@ -21,42 +20,54 @@ pub(super) struct Way {
     pub(super) released: f64,
 }
 
-impl Way {
-    pub(super) fn new(from: Pose, goal: Pose) -> Self {
-        let mut way = Self {
-            from,
-            goal,
-            turn: Vector3::zeros(),
+/// The way of one support.
+#[derive(Clone)]
+struct Leg {
+    from: Pose,
+    goal: Pose,
+    /// Turn of the support, in its own axes.
+    turn: Vector3<f64>,
+}
+
+impl<L> Default for Way<L> {
+    fn default() -> Self {
+        Self {
+            legs: Vec::new(),
+            reached: 0.0,
             start: None,
             iterations: 0,
             solved_afresh: false,
             jump: 0.0,
             released: 0.0,
+        }
+    }
+}
+
+impl<L> Way<L> {
+    /// Becomes the way between poses, in the room of the last one.
+    pub(super) fn begin(&mut self, from: &[Pose], goals: impl Iterator<Item = Pose>) {
+        let mut legs = std::mem::take(&mut self.legs);
+        legs.clear();
+        legs.extend(from.iter().zip(goals).map(|(from, goal)| Leg {
+            from: *from,
+            goal,
+            turn: turn_between(&from.frame, &goal.frame),
+        }));
+        *self = Self {
+            legs,
+            ..Self::default()
         };
-        way.redirect(from, goal);
-        way
     }
 
-    /// Takes other ends, with what has happened so far.
-    pub(super) fn redirect(&mut self, from: Pose, goal: Pose) {
-        (self.from, self.goal) = (from, goal);
-        self.turn = turn_between(&from.frame, &goal.frame);
-    }
-
-    /// Length, displacement in U and turn in rad.
+    /// Length, displacements in U and turns in rad.
     pub(super) fn length(&self) -> f64 {
-        (self.goal.position - self.from.position).norm() + self.turn.norm()
+        let way = |leg: &Leg| (leg.goal.position - leg.from.position).norm() + leg.turn.norm();
+        self.legs.iter().map(way).sum()
     }
 
-    /// The pose at a share of the way.
-    pub(super) fn pose(&self, share: f64) -> Pose {
-        if share >= 1.0 {
-            return self.goal;
-        }
-        Pose {
-            position: self.from.position.lerp(&self.goal.position, share),
-            frame: self.from.frame * exp(&(share * self.turn)),
-        }
+    /// The poses at a share of the way.
+    pub(super) fn poses(&self, share: f64) -> impl ExactSizeIterator<Item = Pose> + Clone {
+        self.legs.iter().map(move |leg| leg.pose(share))
     }
 
     pub(super) fn add(&mut self, jump: f64, released: f64) {
@@ -65,9 +76,16 @@ impl Way {
     }
 }
 
-/// Distance of two poses, displacement in U and turn in rad.
-pub(super) fn distance(from: &Pose, to: &Pose) -> f64 {
-    (to.position - from.position).norm() + turn_between(&from.frame, &to.frame).norm()
+impl Leg {
+    fn pose(&self, share: f64) -> Pose {
+        if share >= 1.0 {
+            return self.goal;
+        }
+        Pose {
+            position: self.from.position.lerp(&self.goal.position, share),
+            frame: self.from.frame * exp(&(share * self.turn)),
+        }
+    }
 }
 
 /// The turn from one frame to another as a rotation vector in the axes of the first.
