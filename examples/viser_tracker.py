@@ -1,4 +1,4 @@
-"""A belt in the browser: drag the gizmo at its end, and the belt follows. It is red where it cannot.
+"""A belt in the browser: drag the gizmo at its end, and the belt follows; it is red where it cannot follow.
 
 Run it from the root of the repository. Ctrl-C ends it.
 """
