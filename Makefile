@@ -26,7 +26,7 @@ NEED_CARGO := @command -v cargo >/dev/null || { echo "fishbone needs cargo, whic
 
 # The inputs of each step, so that a second run redoes only the steps whose inputs have changed.
 RUST_SOURCES := Cargo.toml Cargo.lock $(shell find crates scenarios -type f)
-PYTHON_SOURCES := pyproject.toml $(shell find python tests benchmarks docs -name '*.py' -o -name '*.pyi')
+PYTHON_SOURCES := pyproject.toml $(shell find python tests benchmarks docs examples -name '*.py' -o -name '*.pyi')
 TEXTS := $(shell find *.md LICENSE CITATION.cff docs scenarios tests -type f -not -name '*.pyc' 2>/dev/null)
 
 .PHONY: help demo test test-all docs wheel figures bench clean

@@ -60,7 +60,7 @@ extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "sp
 # The source is the whole repository, so that links lead to the same files here and on the web page of the repository.
 root_doc = "README"
 include_patterns = ["README.md", "CHANGELOG.md", "CONTRIBUTING.md", "docs/*.md", "docs/**.rst"]
-exclude_patterns = [".*", "benchmarks", "crates", "dist", "out", "python", "scenarios", "target", "tests"]
+exclude_patterns = [".*", "benchmarks", "crates", "dist", "examples", "out", "python", "scenarios", "target", "tests"]
 myst_heading_anchors = 4
 highlight_language = "none"
 smartquotes = False

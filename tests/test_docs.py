@@ -50,7 +50,7 @@ def test_each_promise_has_a_test():
 
 @pages
 def test_files_that_are_named_exist(page):
-    paths = re.findall(r"`((?:tests|benchmarks|crates|docs|scenarios)/[\w./]+)`", page.read_text())
+    paths = re.findall(r"`((?:tests|benchmarks|crates|docs|examples|scenarios)/[\w./]+)`", page.read_text())
     assert not [path for path in paths if not (ROOT / path).exists()]
 
 

@@ -341,3 +341,36 @@ def test_a_tracker_has_the_surface_of_its_equilibrium():
     tracker = fb.Tracker(fb.load("scenarios/example1.toml"))
     tracker.update([0.0, 0.55, 0.1], [0.0, 0.0, 0.0])
     np.testing.assert_array_equal(tracker.surface(3), tracker.equilibrium().surface(3))
+
+
+def two_shapes(name: str, *, square: bool) -> tuple[fb.Equilibrium, fb.Equilibrium]:
+    """Two shapes of a board on one mesh: as in its scenario, and with the end moved and turned."""
+    tables = fb.load(f"scenarios/{name}.toml").to_dict()
+    supports = [support | {"square_rib": square} for support in tables["supports"]]
+    tracker = fb.Tracker(fb.Scenario.from_dict(tables | {"supports": supports, "solver": {"elements": 60}}))
+    before = tracker.equilibrium()
+    start, end = before.position[[0, -1]]
+    rotation = np.add(supports[1]["rotation"], [0.0, 0.0, 0.8])
+    assert tracker.update(end + 0.1 * (start - end), rotation).status == "converged"
+    return before, tracker.equilibrium()
+
+
+@pytest.mark.parametrize(("name", "square"), [("example1", True), ("bent", True), ("curved", False)])
+def test_a_fixed_mesh_has_the_same_triangles_for_all_shapes_and_lies_on_the_surface(name, square):
+    shapes = two_shapes(name, square=square)
+    (first, triangles), (second, same) = (shape.mesh(4, fixed=True) for shape in shapes)
+    np.testing.assert_array_equal(triangles, same)
+    assert first.shape == second.shape == (triangles.max() + 1, 3)
+    assert np.abs(second - first).max() > 0.05
+    for shape, vertices in zip(shapes, (first, second), strict=True):
+        rows = vertices.reshape(-1, 4, 3)
+        minus, plus = shape.flat_ribs().transpose(1, 0, 2)
+        inner = np.concatenate([(2.0 * minus + plus) / 3.0, (minus + 2.0 * plus) / 3.0])
+        np.testing.assert_allclose(np.concatenate([rows[:, 1], rows[:, 2]]), shape.material_points(inner), atol=1e-9)
+        np.testing.assert_allclose(rows[:, [0, 3]], np.stack(shape.edges, axis=1), atol=1e-12)
+
+
+def test_a_mesh_of_the_whole_board_changes_with_the_shape():
+    """Ribs through the end's corners, and the corners beyond the last ribs: the reason for meshes that are fixed."""
+    first, second = two_shapes("curved", square=False)
+    assert len(first.mesh(4)[0]) != len(second.mesh(4)[0])

@@ -644,12 +644,18 @@ class Equilibrium:
         triangles = np.stack([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)], axis=1)
         return triangles.reshape(-1, 3)
 
-    def mesh(self, n_across: int = 9) -> tuple[Floats, NDArray[np.int64]]:
+    def mesh(self, n_across: int = 9, *, fixed: bool = False) -> tuple[Floats, NDArray[np.int64]]:
         """Vertices and triangles of the surface.
+
+        They cover the whole board, and their numbers depend on the shape. With `fixed` they are those of `surface` and
+        `surface_triangles`: all shapes with as many nodes have the same triangles, so that a display updates the
+        vertices alone.
 
         Shapes: (p, 3) and (m, 3).
         Errors: as `surface`.
         """
+        if fixed:
+            return self.surface(n_across).reshape(-1, 3), self.surface_triangles(n_across)
         return self._inner.mesh(self._across(n_across))
 
     def outline(self, tolerance: float | None = None) -> Outline:
