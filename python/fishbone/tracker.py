@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     from numpy.typing import NDArray
 
-    from fishbone.names import Place, Status
+    from fishbone.names import End, Place, Status
 
     Floats = NDArray[np.float64]
 
@@ -93,9 +93,8 @@ class Tracker:
     `InvalidArgument` for bytes that are no state of this version, and where no support or one twice is to move.
     """
 
-    __slots__ = ("_inner", "_moving")
+    __slots__ = ("_inner",)
     _inner: _core.Tracker
-    _moving: list[int]
 
     def __init__(
         self,
@@ -105,7 +104,7 @@ class Tracker:
         supports: Sequence[Place] | None = None,
     ) -> None:
         if isinstance(start, bytes):
-            self._take(_core.Tracker.from_bytes(start))
+            self._inner = _core.Tracker.from_bytes(start)
             return
         found = start if isinstance(start, Equilibrium) else solve(start)
         inner = found._inner  # noqa: SLF001 - of this package
@@ -114,10 +113,7 @@ class Tracker:
         moving = [found._support_index(place) for place in places] if inner.reactions else [0]  # noqa: SLF001
         if not moving or len(set(moving)) < len(moving):
             raise InvalidArgument(f"supports: found {places!r}, allowed one support or several, each once")
-        self._take(_core.Tracker(inner, moving))
-
-    def _take(self, inner: _core.Tracker) -> None:
-        self._inner, self._moving = inner, inner.moving
+        self._inner = _core.Tracker(inner, moving)
 
     @classmethod
     def restore(cls, state: bytes) -> Tracker:
@@ -147,7 +143,7 @@ class Tracker:
     @classmethod
     def _of(cls, inner: _core.Tracker) -> Tracker:
         tracker = cls.__new__(cls)
-        tracker._take(inner)  # noqa: SLF001 - its own class
+        tracker._inner = inner  # noqa: SLF001 - its own class
         return tracker
 
     def update(
@@ -181,11 +177,12 @@ class Tracker:
                 raise InvalidArgument("rotation: found one beside poses by support, allowed none")
             to = [(self._index_of(place), *parts_of("pose", pose)) for place, pose in position.items()]
         else:
-            if len(self._moving) > 1:
-                found = f"found one for {len(self._moving)} moving supports"
+            moving = self._inner.moving
+            if len(moving) != 1:
+                found = f"found one for {len(moving)} moving supports"
                 raise InvalidArgument(f'pose: {found}, allowed poses by support, as {{"end": pose}}')
             pose: Any = position if rotation is None else (position, rotation)
-            to = [(self._moving[0], *parts_of("pose", pose))]
+            to = [(moving[0], *parts_of("pose", pose))]
         for name, limit in (("max_time", max_time), ("max_iterations", max_iterations)):
             if limit is not None and not (limit > 0 and limit < math.inf):
                 raise InvalidArgument(f"{name}: found {limit}, allowed a finite positive number")
@@ -204,7 +201,7 @@ class Tracker:
         Units: those of the scenario; rad.
         Errors: those of `update`, before the first update.
         """
-        moving = self._moving
+        moving = self._inner.moving
         shape = (None, 3) if len(moving) == 1 else (None, len(moving), 3)
         rows = numbers_of("positions", positions, shape).reshape(-1, len(moving), 3)
         turns: list[Any] = [[None] * len(moving)] * len(rows)
@@ -221,6 +218,23 @@ class Tracker:
         each = (len(updates), *shape[1:])
         positions = np.reshape(shapes, (len(shapes), len(u), 3))
         return Updates(updates, valid, u, positions, force.reshape(each), moment.reshape(each))
+
+    def regrasp(self, *, hold: End | float | None = None, release: Place | None = None) -> Update:
+        """Takes hold of the belt at a place, an end or an arc length, and lets another support go.
+
+        The new support is a clamp that moves from then on, with the other supports that move. What supports still hold
+        between them keeps its shape; a part that none holds any more comes to rest from the shape that it has. `jump` is
+        the largest displacement of what is still held. Where no equilibrium is found the tracker stays as it was.
+
+        Units: `hold` in those of the scenario.
+        Errors: `InvalidArgument` where neither is given; `NoSupport`; `InvalidScenario` for supports that no scenario may
+        have, such as two at one place.
+        """
+        if hold is None and release is None:
+            raise InvalidArgument("regrasp: found neither a hold nor a release, allowed one or both")
+        ends = {"start": 0.0, "end": float(self.u[-1])}
+        at = ends.get(hold, math.nan) if isinstance(hold, str) else hold
+        return Update(*self._inner.regrasp(at, None if release is None else self._index_of(release)))
 
     @property
     def energy(self) -> float:

@@ -25,15 +25,15 @@ pub(crate) struct Tracker {
     moving: Exclusive<core::Tracker>,
     /// Locked to be copied alone, never while the GIL is waited for.
     shown: Mutex<Shown>,
-    /// Arc length of every support.
-    supports: Vec<f64>,
-    /// The supports that move.
-    moves: Vec<usize>,
 }
 
 /// The shape after the last update, which can be read during the next one.
 #[derive(Default)]
 struct Shown {
+    /// Arc length of every support.
+    supports: Vec<f64>,
+    /// The supports that move.
+    moving: Vec<usize>,
     energy: f64,
     nodes: Vec<f64>,
     positions: Vec<Vector3<f64>>,
@@ -49,6 +49,8 @@ impl Shown {
             values.clear();
             values.extend(with);
         }
+        fill(&mut self.supports, tracker.supports());
+        fill(&mut self.moving, tracker.moving().iter().copied());
         self.energy = tracker.energy();
         fill(&mut self.nodes, tracker.nodes());
         fill(&mut self.positions, tracker.positions());
@@ -133,8 +135,6 @@ impl Tracker {
         let mut shown = Shown::default();
         shown.copy(&tracker);
         Self {
-            supports: tracker.supports(),
-            moves: tracker.moving().to_vec(),
             moving: Exclusive::new(tracker),
             shown: Mutex::new(shown),
         }
@@ -260,6 +260,24 @@ impl Tracker {
         Ok((updates.collect(), shapes.collect(), wrenches))
     }
 
+    /// Takes hold of the belt at an arc length and lets a support go, which is named by its place before; as `update`.
+    ///
+    /// Errors: as `update`.
+    fn regrasp(
+        &self,
+        py: Python<'_>,
+        hold: Option<f64>,
+        release: Option<usize>,
+    ) -> PyResult<Updated> {
+        let update = self.moving.with(py, |tracker, signals| {
+            let update = tracker.regrasp(hold, release, &mut || signals.proceed());
+            self.shown().copy(tracker);
+            update
+        })?;
+        let update = update.map_err(|refused| invalid_scenario(py, &refused, None))?;
+        Ok(updated(update, None))
+    }
+
     /// The present scenario and its equilibrium.
     ///
     /// Errors: as `update`, but for the pose.
@@ -273,13 +291,13 @@ impl Tracker {
     /// The supports that move, by their places in the scenario.
     #[getter]
     fn moving(&self) -> Vec<usize> {
-        self.moves.clone()
+        self.read(|shown| shown.moving.clone())
     }
 
     /// Arc length of every support.
     #[getter]
     fn supports(&self) -> Vec<f64> {
-        self.supports.clone()
+        self.read(|shown| shown.supports.clone())
     }
 
     #[getter]

@@ -148,6 +148,25 @@ impl Tracker {
         of_led!(&mut self.0, led => led.update(goals, proceed))
     }
 
+    /// Takes hold of the belt at an arc length, by a support that moves from then on, and lets another support go, named by its
+    /// place in the scenario before. What supports still hold between them keeps its shape; the rest comes to rest from the
+    /// shape that it has. The update's jump is the largest displacement of what is still held. Where no equilibrium is found the
+    /// tracker stays as it was.
+    ///
+    /// Units: those of the scenario.
+    ///
+    /// # Errors
+    ///
+    /// [`ScenarioError`] for supports that no scenario may have: two at one place, one off the belt, none to let go.
+    pub fn regrasp(
+        &mut self,
+        hold: Option<f64>,
+        release: Option<usize>,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Result<Update, ScenarioError> {
+        of_led!(&mut self.0, led => led.regrasp(hold, release, proceed))
+    }
+
     /// Checks goals as [`Self::update`] does, without moving.
     ///
     /// # Errors

@@ -6,6 +6,9 @@ use crate::problem::program::{BeltProgram, Piece};
 use crate::strip::bounds::ActiveEdges;
 use crate::strip::density::Density;
 
+/// Distance up to which two places are one, in U.
+const SAME_PLACE: f64 = 1e-9;
+
 /// A mesh, with the active edges of its pieces.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
@@ -72,16 +75,7 @@ impl Mesh {
     /// Units: U
     pub(crate) fn graded(&self, problem: &Problem, lengths: &[f64], places: &[[f64; 2]]) -> Self {
         let wholes = problem.lengths_of_stretches();
-        let mut own = Vec::with_capacity(lengths.len());
-        let mut start = 0.0;
-        for (division, whole) in self.divisions.iter().zip(&wholes) {
-            own.extend(division.places().map(|[from, share]| {
-                let [from, to] = [from, from + share].map(|share| start + share * whole);
-                [from, to]
-            }));
-            start += whole;
-        }
-        let mut ramps = ramps(&own, lengths, places).into_iter();
+        let mut ramps = ramps(&self.ends(problem), lengths, places).into_iter();
         let graded = self.divisions.iter().zip(&wholes).map(|(division, whole)| {
             let of_stretch: Vec<_> = ramps.by_ref().take(division.0.len()).flatten().collect();
             divided(&of_stretch, *whole)
@@ -90,6 +84,61 @@ impl Mesh {
             divisions: graded.collect(),
             pieces: Vec::new(),
         }
+    }
+
+    /// The mesh on the stretches that another problem of the same belt has, given with its own problem: at every new end of a
+    /// stretch, the nearer node of the element there moves to it. Active edges are left to be chosen.
+    pub(crate) fn with_stretches_of(&self, other: &Problem, own: &Problem) -> Self {
+        let wholes = other.lengths_of_stretches();
+        let cuts: Vec<f64> = wholes
+            .iter()
+            .scan(0.0, |end, whole| {
+                *end += whole;
+                Some(*end)
+            })
+            .collect();
+        let is_cut = |at: f64| cuts.iter().any(|cut| (cut - at).abs() <= SAME_PLACE);
+        let mut elements = self.ends(own);
+        for cut in &cuts {
+            let inside = |[from, to]: &[f64; 2]| (from + SAME_PLACE..to - SAME_PLACE).contains(cut);
+            let Some(k) = elements.iter().position(inside) else {
+                continue;
+            };
+            let [from, to] = elements[k];
+            let is_free = |end: f64| !is_cut(end) && end > 0.0;
+            if is_free(to) && (to - cut <= cut - from || !is_free(from)) {
+                (elements[k][1], elements[k + 1][0]) = (*cut, *cut);
+            } else if is_free(from) {
+                (elements[k - 1][1], elements[k][0]) = (*cut, *cut);
+            } else {
+                elements.splice(k..=k, [[from, *cut], [*cut, to]]);
+            }
+        }
+        let stretches = wholes.iter().zip(&cuts).map(|(whole, end)| {
+            let is_inside =
+                |[from, to]: &&[f64; 2]| (end - whole..*end).contains(&(0.5 * (from + to)));
+            let inside = elements.iter().filter(is_inside);
+            Division(inside.map(|[from, to]| (to - from) / whole).collect())
+        });
+        Self {
+            divisions: stretches.collect(),
+            pieces: Vec::new(),
+        }
+    }
+
+    /// Both ends of every element, in U.
+    fn ends(&self, problem: &Problem) -> Vec<[f64; 2]> {
+        let mut start = 0.0;
+        let stretches = self.divisions.iter().zip(problem.lengths_of_stretches());
+        let ends = stretches.flat_map(|(division, whole)| {
+            let at = start;
+            start += whole;
+            let place = move |share: f64| at + share * whole;
+            division
+                .places()
+                .map(move |[from, share]| [from, from + share].map(place))
+        });
+        ends.collect()
     }
 
     /// Number of elements.
@@ -224,7 +273,7 @@ fn is_strip(piece: &Piece) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scenario::{BeltSpec, Scenario, SegmentSpec};
+    use crate::scenario::{BeltSpec, Component, Place, Scenario, SegmentSpec, SupportSpec};
 
     fn problem() -> Problem {
         let segments = vec![
@@ -233,6 +282,47 @@ mod tests {
             SegmentSpec::straight(2.5),
         ];
         Problem::new(Scenario::new(BeltSpec::new(0.1, 1.0, segments))).unwrap()
+    }
+
+    #[test]
+    fn test_nodes_move_to_the_new_ends_of_stretches() {
+        let own = problem();
+        let mut scenario = own.scenario().clone();
+        scenario.supports = [0.26, 1.2, 1.5 + 0.6].map(held_at).into();
+        let other = Problem::new(scenario).unwrap();
+        let mesh = Mesh::uniform(&own, 14);
+        let moved = mesh.with_stretches_of(&other, &own);
+        assert_eq!(moved.elements(), mesh.elements());
+        let (before, after) = (lengths(&own, &mesh), lengths(&other, &moved));
+        let nodes = |lengths: &[f64]| -> Vec<f64> {
+            let ends = lengths.iter().scan(0.0, |end, length| {
+                *end += length;
+                Some(*end)
+            });
+            ends.collect()
+        };
+        for (before, after) in nodes(&before).into_iter().zip(nodes(&after)) {
+            let is_cut = [0.26, 1.6]
+                .iter()
+                .any(|cut| (4.0 * after - cut).abs() < 1e-12);
+            assert!(is_cut || (before - after).abs() < 1e-12, "{before} {after}");
+        }
+        let single = Mesh::uniform(&own, 2).with_stretches_of(&other, &own);
+        assert_eq!(single.elements(), 4);
+        assert_eq!(
+            mesh.with_stretches_of(&own, &own).divisions.len(),
+            mesh.divisions.len()
+        );
+    }
+
+    fn held_at(u: f64) -> SupportSpec {
+        let mut support = SupportSpec::new(Place::ArcLength(u));
+        support.position = Some([
+            Component::Held(0.0),
+            Component::Held(u),
+            Component::Held(0.0),
+        ]);
+        support
     }
 
     fn lengths(problem: &Problem, mesh: &Mesh) -> Vec<f64> {

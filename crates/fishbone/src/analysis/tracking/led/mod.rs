@@ -2,6 +2,7 @@
 
 mod lead;
 mod mesh;
+mod regrasp;
 #[cfg(feature = "io")]
 mod stored;
 mod way;
@@ -138,24 +139,37 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
         }
         let units = self.units();
         let update = Update {
-            status,
             message: self.message(status, &way, is_stopped),
             fraction: match status {
                 Status::Converged => 1.0,
                 _ => way.reached,
             },
             solved_afresh: way.solved_afresh && status == Status::Converged,
-            taut: self.is_taut(),
             snapped: way.jump > 0.0,
             jump: way.jump * units.length,
             released: way.released * units.energy,
-            energy: self.energy(),
-            iterations: way.iterations,
-            residuals: self.follower.residuals(),
+            ..self.report(status, way.iterations)
         };
         way.start = None;
         self.way = way;
         Ok(update)
+    }
+
+    /// What holds of the present shape, whatever has led to it.
+    fn report(&mut self, status: Status, iterations: usize) -> Update {
+        Update {
+            status,
+            message: String::new(),
+            fraction: 0.0,
+            solved_afresh: false,
+            taut: self.is_taut(),
+            snapped: false,
+            jump: 0.0,
+            released: 0.0,
+            energy: self.energy(),
+            iterations,
+            residuals: self.follower.residuals(),
+        }
     }
 
     /// Poses that the moving supports are to take, in the units of the programme.
@@ -330,6 +344,11 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
     /// Position of a pose of the programme.
     pub(super) fn position(&self, pose: &Pose) -> Vector3<f64> {
         self.in_scenario(pose).position
+    }
+
+    /// Positions of the nodes.
+    fn world(&self) -> impl Iterator<Item = Vector3<f64>> {
+        self.poses().iter().map(|pose| self.position(pose))
     }
 
     /// Poses of the nodes, in the units of the programme.

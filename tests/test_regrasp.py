@@ -1,0 +1,106 @@
+"""A tracker takes hold of its belt elsewhere and lets go: what is still held keeps its shape."""
+
+import numpy as np
+import pytest
+
+import fishbone as fb
+
+POSITION = np.array([0.0, 0.5, 0.1])
+TURN = np.array([0.2, -0.1, 0.3])
+
+
+def example1(energy="fishbone", elements=64):
+    tables = fb.load("scenarios/example1.toml").to_dict()
+    tracker = fb.Tracker(fb.Scenario.from_dict(tables | {"energy": energy, "solver": {"elements": elements}}))
+    assert tracker.update(POSITION + [0.05, -0.03, 0.02], TURN).status == "converged"
+    return tracker
+
+
+def shape_at(tracker, u):
+    return np.array([np.interp(u, tracker.u, tracker.position[:, axis]) for axis in range(3)]).T
+
+
+def places(tracker):
+    return [support["at"] for support in tracker.equilibrium().scenario.to_dict()["supports"]]
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_the_part_that_is_still_held_keeps_its_shape_in_random_regrasps(seed):
+    random = np.random.default_rng(seed)
+    tracker = fb.Tracker(fb.load("scenarios/example1.toml"))
+    pose = POSITION + random.uniform(-0.1, 0.1, 3), random.uniform(-0.4, 0.4, 3)
+    assert tracker.update(*pose).status == "converged"
+    before, hold = tracker.copy(), float(random.uniform(0.3, 0.7))
+    update = tracker.regrasp(hold=hold, release="end")
+    assert (update.status, update.snapped) == ("converged", False)
+    held = tracker.u[tracker.u <= hold]
+    np.testing.assert_allclose(shape_at(tracker, held), shape_at(before, held), atol=1e-3)
+    assert update.energy == pytest.approx(before.energy - update.released)
+    assert update.released > 0.0
+    there = shape_at(tracker, [hold])[0]
+    assert tracker.update(there + [0.005, 0.0, 0.0]).status == "converged"
+    np.testing.assert_allclose(shape_at(tracker, [hold])[0], there + [0.005, 0.0, 0.0], atol=1e-8)
+
+
+@pytest.mark.parametrize("energy", ["fishbone", "wunderlich"])
+def test_a_hold_alone_changes_no_energy_and_bears_no_load(energy):
+    tracker = example1(energy)
+    energy, nodes, end = tracker.energy, len(tracker.u), tracker.reaction("end")
+    update = tracker.regrasp(hold=0.44)
+    assert update.status == "converged"
+    assert update.jump < 1e-3
+    assert (places(tracker), len(tracker.u)) == (["start", 0.44, "end"], nodes)
+    assert tracker.energy == pytest.approx(energy, rel=2e-3)
+    np.testing.assert_allclose(tracker.reaction("end").force, end.force, rtol=0.03, atol=0.3)
+    assert np.linalg.norm(tracker.reaction(0.44).force) < 0.05 * np.linalg.norm(end.force)
+    there = shape_at(tracker, [0.44])[0]
+    assert tracker.update({0.44: there + [0.0, 0.0, 0.01]}).status == "converged"
+
+
+def test_the_start_is_let_go_and_the_end_carries_the_belt():
+    tracker = example1()
+    before = tracker.copy()
+    update = tracker.regrasp(hold=0.5, release="start")
+    assert update.status == "converged"
+    assert places(tracker) == [0.5, "end"]
+    held = tracker.u[tracker.u >= 0.5]
+    np.testing.assert_allclose(shape_at(tracker, held), shape_at(before, held), atol=1e-3)
+    moved = tracker.update({"end": fb.Pose(POSITION + [0.05, -0.02, 0.02], TURN)})
+    assert moved.status == "converged"
+
+
+def test_a_belt_is_handed_over_from_hold_to_hold():
+    tracker = example1()
+    for hold, release in [(0.6, "end"), (0.8, 0.6), ("end", 0.8)]:
+        assert tracker.regrasp(hold=hold, release=release).status == "converged"
+    assert places(tracker)[1] in {"end", 1.0}
+    assert tracker.energy < 1e-3
+    assert tracker.update(tracker.position[-1] + [0.0, -0.05, 0.05]).status == "converged"
+    assert tracker.energy > 0.1
+
+
+def test_a_regrasp_on_a_state_and_a_copy_is_the_same():
+    tracker = example1()
+    others = [tracker.copy(), fb.Tracker.restore(tracker.state())]
+    update = tracker.regrasp(hold=0.5, release="end")
+    for other in others:
+        assert repr(other.regrasp(hold=0.5, release="end")) == repr(update)
+        np.testing.assert_array_equal(other.position, tracker.position)
+
+
+@pytest.mark.parametrize(
+    ("regrasp", "kind", "words"),
+    [
+        ({}, fb.InvalidArgument, "regrasp: found neither a hold nor a release"),
+        ({"hold": 1.5}, fb.InvalidScenario, r"supports\[2\]\.at: found 1\.5"),
+        ({"hold": float("nan")}, fb.InvalidScenario, r"supports\[0\]\.at: found nan"),
+        ({"hold": "end"}, fb.InvalidScenario, r"supports\[\d\]\.at: found"),
+        ({"release": 0.3}, fb.NoSupport, "support 0.3: found supports at"),
+    ],
+)
+def test_a_regrasp_that_cannot_be_is_refused_and_changes_nothing(regrasp, kind, words):
+    tracker = example1()
+    state = tracker.state()
+    with pytest.raises(kind, match=words):
+        tracker.regrasp(**regrasp)
+    assert tracker.state() == state
