@@ -125,8 +125,8 @@ typedef struct FishboneUpdate {
    */
   enum FishboneOutcome status;
   /**
-   * Whether the equilibrium that was followed ceased to exist or to be stable on the way, or could not be followed, and the
-   * belt has snapped to another one.
+   * Whether the equilibrium that was followed ceased to exist or to be stable on the way, or could not be followed, and
+   * the belt has snapped to another one.
    */
   bool snapped;
   /**
@@ -160,7 +160,8 @@ extern "C" {
 #endif // __cplusplus
 
 /**
- * One line of UTF-8: why the last call of this thread failed, or why its solve or update did not converge; empty if neither.
+ * One line of UTF-8: why the last call of this thread failed, or why its solve or update did not converge; empty if
+ * neither.
  *
  * The text is valid up to the next call of this thread. This function is no such call, nor are those that free a handle.
  */
@@ -189,7 +190,8 @@ enum FishboneStatus fishbone_scenario_from_json(const char *json,
 void fishbone_scenario_free(struct FishboneScenario *scenario);
 
 /**
- * Solves a scenario. A search that finds no equilibrium is no failure of the call: fishbone_equilibrium_status has its outcome.
+ * Solves a scenario. A search that finds no equilibrium is no failure of the call: fishbone_equilibrium_status has its
+ * outcome.
  */
 enum FishboneStatus fishbone_solve(const struct FishboneScenario *scenario,
                                    struct FishboneEquilibrium **equilibrium);
@@ -227,8 +229,8 @@ enum FishboneStatus fishbone_equilibrium_positions(const struct FishboneEquilibr
                                                    size_t capacity);
 
 /**
- * Frames of the nodes: nine numbers each, a row-major matrix whose columns are the normal, the tangent and the width direction
- * in world axes.
+ * Frames of the nodes: nine numbers each, a row-major matrix whose columns are the normal, the tangent and the width
+ * direction in world axes.
  */
 enum FishboneStatus fishbone_equilibrium_frames(const struct FishboneEquilibrium *equilibrium,
                                                 double *buffer,
@@ -254,8 +256,8 @@ enum FishboneStatus fishbone_equilibrium_reaction(const struct FishboneEquilibri
 void fishbone_equilibrium_free(struct FishboneEquilibrium *equilibrium);
 
 /**
- * Makes a tracker of an equilibrium that has converged to a minimum. The support that is to move is named by its place in the
- * scenario, from 0, and holds a position and a rotation.
+ * Makes a tracker of an equilibrium that has converged to a minimum. The support that is to move is named by its place in
+ * the scenario, from 0, and holds a position and a rotation.
  */
 enum FishboneStatus fishbone_tracker_new(const struct FishboneEquilibrium *equilibrium,
                                          size_t support,
@@ -273,9 +275,9 @@ enum FishboneStatus fishbone_tracker_copy(const struct FishboneTracker *tracker,
  * A pose that the belt does not reach is no failure of the call: the status of the update has the outcome, and the tracker
  * keeps its last pose. A pose that no scenario may hold, such as one that is not finite, is refused.
  *
- * From the second update on nothing is allocated where the equilibrium is followed on its mesh and the board has neither links
- * nor bends. Beyond: the mesh changes, and with it the number of nodes, where the error of the shape asks for it, unless
- * solver.elements of the scenario fixes the mesh; that of a slender belt is graded anew at every update.
+ * From the second update on nothing is allocated where the equilibrium is followed on its mesh and the board has neither
+ * links nor bends. Beyond: the mesh changes, and with it the number of nodes, where the error of the shape asks for it,
+ * unless solver.elements of the scenario fixes the mesh; that of a slender belt is graded anew at every update.
  */
 enum FishboneStatus fishbone_tracker_update(struct FishboneTracker *tracker,
                                             const double *position,
@@ -328,10 +330,11 @@ enum FishboneStatus fishbone_tracker_reaction(const struct FishboneTracker *trac
                                               struct FishboneWrench *reaction);
 
 /**
- * Saves the state of a tracker as bytes, for the same version of fishbone; a tracker of them updates as this one, to the bit.
+ * Saves the state of a tracker as bytes, for the same version of fishbone; a tracker of them updates as this one, to the
+ * bit.
  *
- * The number of bytes is written to size, also where the buffer has less room: a buffer of capacity 0, which may be null, asks
- * for it.
+ * The number of bytes is written to size, also where the buffer has less room: a buffer of capacity 0, which may be null,
+ * asks for it.
  */
 enum FishboneStatus fishbone_tracker_save(const struct FishboneTracker *tracker,
                                           uint8_t *buffer,

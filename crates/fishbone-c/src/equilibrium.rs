@@ -33,7 +33,8 @@ impl From<Wrench> for FishboneWrench {
     }
 }
 
-/// Solves a scenario. A search that finds no equilibrium is no failure of the call: fishbone_equilibrium_status has its outcome.
+/// Solves a scenario. A search that finds no equilibrium is no failure of the call: fishbone_equilibrium_status has its
+/// outcome.
 #[unsafe(no_mangle)]
 pub extern "C" fn fishbone_solve(
     scenario: Option<&FishboneScenario>,
@@ -102,8 +103,8 @@ pub unsafe extern "C" fn fishbone_equilibrium_positions(
     })
 }
 
-/// Frames of the nodes: nine numbers each, a row-major matrix whose columns are the normal, the tangent and the width direction
-/// in world axes.
+/// Frames of the nodes: nine numbers each, a row-major matrix whose columns are the normal, the tangent and the width
+/// direction in world axes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fishbone_equilibrium_frames(
     equilibrium: Option<&FishboneEquilibrium>,

@@ -58,7 +58,8 @@ pub(crate) fn report(status: Status, message: &str) -> FishboneOutcome {
     status.into()
 }
 
-/// One line of UTF-8: why the last call of this thread failed, or why its solve or update did not converge; empty if neither.
+/// One line of UTF-8: why the last call of this thread failed, or why its solve or update did not converge; empty if
+/// neither.
 ///
 /// The text is valid up to the next call of this thread. This function is no such call, nor are those that free a handle.
 #[unsafe(no_mangle)]

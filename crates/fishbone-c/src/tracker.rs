@@ -43,8 +43,8 @@ impl From<NotStored> for Refusal {
 pub struct FishboneUpdate {
     /// Whether the belt is in equilibrium under the new pose; unless converged, the tracker keeps its last pose.
     pub status: FishboneOutcome,
-    /// Whether the equilibrium that was followed ceased to exist or to be stable on the way, or could not be followed, and the
-    /// belt has snapped to another one.
+    /// Whether the equilibrium that was followed ceased to exist or to be stable on the way, or could not be followed, and
+    /// the belt has snapped to another one.
     pub snapped: bool,
     /// Whether the belt could not be followed to the pose, so that its problem there was solved afresh.
     pub solved_afresh: bool,
@@ -75,8 +75,8 @@ impl From<Update> for FishboneUpdate {
     }
 }
 
-/// Makes a tracker of an equilibrium that has converged to a minimum. The support that is to move is named by its place in the
-/// scenario, from 0, and holds a position and a rotation.
+/// Makes a tracker of an equilibrium that has converged to a minimum. The support that is to move is named by its place in
+/// the scenario, from 0, and holds a position and a rotation.
 #[unsafe(no_mangle)]
 pub extern "C" fn fishbone_tracker_new(
     equilibrium: Option<&FishboneEquilibrium>,
@@ -104,9 +104,9 @@ pub extern "C" fn fishbone_tracker_copy(
 /// A pose that the belt does not reach is no failure of the call: the status of the update has the outcome, and the tracker
 /// keeps its last pose. A pose that no scenario may hold, such as one that is not finite, is refused.
 ///
-/// From the second update on nothing is allocated where the equilibrium is followed on its mesh and the board has neither links
-/// nor bends. Beyond: the mesh changes, and with it the number of nodes, where the error of the shape asks for it, unless
-/// solver.elements of the scenario fixes the mesh; that of a slender belt is graded anew at every update.
+/// From the second update on nothing is allocated where the equilibrium is followed on its mesh and the board has neither
+/// links nor bends. Beyond: the mesh changes, and with it the number of nodes, where the error of the shape asks for it,
+/// unless solver.elements of the scenario fixes the mesh; that of a slender belt is graded anew at every update.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fishbone_tracker_update(
     tracker: Option<&mut FishboneTracker>,
@@ -213,10 +213,11 @@ pub extern "C" fn fishbone_tracker_reaction(
     })
 }
 
-/// Saves the state of a tracker as bytes, for the same version of fishbone; a tracker of them updates as this one, to the bit.
+/// Saves the state of a tracker as bytes, for the same version of fishbone; a tracker of them updates as this one, to the
+/// bit.
 ///
-/// The number of bytes is written to size, also where the buffer has less room: a buffer of capacity 0, which may be null, asks
-/// for it.
+/// The number of bytes is written to size, also where the buffer has less room: a buffer of capacity 0, which may be null,
+/// asks for it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fishbone_tracker_save(
     tracker: Option<&FishboneTracker>,
