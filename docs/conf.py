@@ -19,6 +19,7 @@ docs/scenario
 docs/sweep
 docs/command
 docs/python/index
+docs/c
 docs/gallery
 ```
 

@@ -187,7 +187,7 @@ impl Tracker {
     }
 
     /// Positions of the nodes.
-    pub fn positions(&self) -> impl Iterator<Item = Vector3<f64>> {
+    pub fn positions(&self) -> impl ExactSizeIterator<Item = Vector3<f64>> {
         let poses = of_led!(&self.0, led => led.poses()).iter();
         poses.map(|pose| of_led!(&self.0, led => led.position(pose)))
     }
@@ -207,19 +207,19 @@ impl Tracker {
     }
 
     /// Frames of the nodes.
-    pub fn frames(&self) -> impl Iterator<Item = &Matrix3<f64>> {
+    pub fn frames(&self) -> impl ExactSizeIterator<Item = &Matrix3<f64>> {
         let poses = of_led!(&self.0, led => led.poses()).iter();
         poses.map(|pose| &pose.frame)
     }
 
     /// Bend at the nodes.
-    pub fn bends(&self) -> impl Iterator<Item = f64> {
+    pub fn bends(&self) -> impl ExactSizeIterator<Item = f64> {
         let nodes = 0..of_led!(&self.0, led => led.poses()).len();
         nodes.map(|node| of_led!(&self.0, led => led.bend(node)))
     }
 
     /// Rib slope at the nodes.
-    pub fn rib_slopes(&self) -> impl Iterator<Item = f64> {
+    pub fn rib_slopes(&self) -> impl ExactSizeIterator<Item = f64> {
         let nodes = 0..of_led!(&self.0, led => led.poses()).len();
         nodes.map(|node| of_led!(&self.0, led => led.rib_slope(node)))
     }
