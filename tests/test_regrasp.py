@@ -12,7 +12,7 @@ TURN = np.array([0.2, -0.1, 0.3])
 def example1(energy="fishbone", elements=64):
     tables = fb.load("scenarios/example1.toml").to_dict()
     tracker = fb.Tracker(fb.Scenario.from_dict(tables | {"energy": energy, "solver": {"elements": elements}}))
-    assert tracker.update(POSITION + [0.05, -0.03, 0.02], TURN).status == "converged"
+    assert tracker.update(POSITION + np.array([0.05, -0.03, 0.02]), TURN).status == "converged"
     return tracker
 
 
@@ -38,8 +38,8 @@ def test_the_part_that_is_still_held_keeps_its_shape_in_random_regrasps(seed):
     assert update.energy == pytest.approx(before.energy - update.released)
     assert update.released > 0.0
     there = shape_at(tracker, [hold])[0]
-    assert tracker.update(there + [0.005, 0.0, 0.0]).status == "converged"
-    np.testing.assert_allclose(shape_at(tracker, [hold])[0], there + [0.005, 0.0, 0.0], atol=1e-8)
+    assert tracker.update(there + np.array([0.005, 0.0, 0.0])).status == "converged"
+    np.testing.assert_allclose(shape_at(tracker, [hold])[0], there + np.array([0.005, 0.0, 0.0]), atol=1e-8)
 
 
 @pytest.mark.parametrize("energy", ["fishbone", "wunderlich"])
@@ -54,7 +54,7 @@ def test_a_hold_alone_changes_no_energy_and_bears_no_load(energy):
     np.testing.assert_allclose(tracker.reaction("end").force, end.force, rtol=0.03, atol=0.3)
     assert np.linalg.norm(tracker.reaction(0.44).force) < 0.05 * np.linalg.norm(end.force)
     there = shape_at(tracker, [0.44])[0]
-    assert tracker.update({0.44: there + [0.0, 0.0, 0.01]}).status == "converged"
+    assert tracker.update({0.44: there + np.array([0.0, 0.0, 0.01])}).status == "converged"
 
 
 def test_the_start_is_let_go_and_the_end_carries_the_belt():
@@ -65,7 +65,7 @@ def test_the_start_is_let_go_and_the_end_carries_the_belt():
     assert places(tracker) == [0.5, "end"]
     held = tracker.u[tracker.u >= 0.5]
     np.testing.assert_allclose(shape_at(tracker, held), shape_at(before, held), atol=1e-3)
-    moved = tracker.update({"end": fb.Pose(POSITION + [0.05, -0.02, 0.02], TURN)})
+    moved = tracker.update({"end": fb.Pose(POSITION + np.array([0.05, -0.02, 0.02]), TURN)})
     assert moved.status == "converged"
 
 

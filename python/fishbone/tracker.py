@@ -222,13 +222,14 @@ class Tracker:
     def regrasp(self, *, hold: End | float | None = None, release: Place | None = None) -> Update:
         """Takes hold of the belt at a place, an end or an arc length, and lets another support go.
 
-        The new support is a clamp that moves from then on, with the other supports that move. What supports still hold
-        between them keeps its shape; a part that none holds any more comes to rest from the shape that it has. `jump` is
-        the largest displacement of what is still held. Where no equilibrium is found the tracker stays as it was.
+        The new support is a clamp that moves from then on, with the other supports that move. What supports still
+        hold between them keeps its shape; a part that none holds any more comes to rest from the shape that it has.
+        `jump` is the largest displacement of what is still held. Where no equilibrium is found the tracker stays as it
+        was.
 
         Units: `hold` in those of the scenario.
-        Errors: `InvalidArgument` where neither is given; `NoSupport`; `InvalidScenario` for supports that no scenario may
-        have, such as two at one place.
+        Errors: `InvalidArgument` where neither is given; `NoSupport`; `InvalidScenario` for supports that no scenario
+        may have, such as two at one place.
         """
         if hold is None and release is None:
             raise InvalidArgument("regrasp: found neither a hold nor a release, allowed one or both")

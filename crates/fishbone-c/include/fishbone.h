@@ -97,7 +97,7 @@ typedef struct FishboneEquilibrium FishboneEquilibrium;
 typedef struct FishboneScenario FishboneScenario;
 
 /**
- * An equilibrium and the support that moves.
+ * An equilibrium and the supports that move.
  */
 typedef struct FishboneTracker FishboneTracker;
 
@@ -117,13 +117,53 @@ typedef struct FishboneWrench {
 } FishboneWrench;
 
 /**
- * The outcome of a motion of the support.
+ * Where a support goes.
+ */
+typedef struct FishboneGoal {
+  /**
+   * The support, by its place in the scenario, from 0.
+   */
+  size_t support;
+  /**
+   * Position, world axes.
+   */
+  double position[3];
+  /**
+   * Rotation vector, world axes; that of a support that holds no frame is not read.
+   */
+  double rotation[3];
+} FishboneGoal;
+
+/**
+ * What an update may take; 0 is no limit.
+ */
+typedef struct FishboneLimits {
+  /**
+   * Time, in seconds: the update ends after the iteration in which it has passed.
+   */
+  double max_time;
+  /**
+   * Iterations.
+   */
+  size_t max_iterations;
+} FishboneLimits;
+
+/**
+ * The outcome of a motion of the supports.
  */
 typedef struct FishboneUpdate {
   /**
-   * Whether the belt is in equilibrium under the new pose; unless converged, the tracker keeps its last pose.
+   * Whether the belt is in equilibrium at its goals; unless converged, the tracker is at a fraction of the way.
    */
   enum FishboneOutcome status;
+  /**
+   * Share of the way to the goals that was reached.
+   */
+  double fraction;
+  /**
+   * Whether the belt is pulled so straight that its shape does not determine all reactions: these are not a number.
+   */
+  bool taut;
   /**
    * Whether the equilibrium that was followed ceased to exist or to be stable on the way, or could not be followed, and
    * the belt has snapped to another one.
@@ -256,11 +296,12 @@ enum FishboneStatus fishbone_equilibrium_reaction(const struct FishboneEquilibri
 void fishbone_equilibrium_free(struct FishboneEquilibrium *equilibrium);
 
 /**
- * Makes a tracker of an equilibrium that has converged to a minimum. The support that is to move is named by its place in
- * the scenario, from 0, and holds a position and a rotation.
+ * Makes a tracker of an equilibrium that has converged to a minimum. The supports that are to move are named by their places
+ * in the scenario, from 0, and hold a position each.
  */
 enum FishboneStatus fishbone_tracker_new(const struct FishboneEquilibrium *equilibrium,
-                                         size_t support,
+                                         const size_t *supports,
+                                         size_t count,
                                          struct FishboneTracker **tracker);
 
 /**
@@ -270,18 +311,19 @@ enum FishboneStatus fishbone_tracker_copy(const struct FishboneTracker *tracker,
                                           struct FishboneTracker **copy);
 
 /**
- * Moves the support to a position and a rotation vector, three numbers each in world axes, and the belt with it.
+ * Moves supports to their goals, all together, and the belt with them; those without a goal stay. The limits may be null.
  *
- * A pose that the belt does not reach is no failure of the call: the status of the update has the outcome, and the tracker
- * keeps its last pose. A pose that no scenario may hold, such as one that is not finite, is refused.
+ * Goals that the belt does not reach are no failure of the call: the status of the update has the outcome, and the tracker
+ * stays at the last equilibrium on the way. A pose that no scenario may hold, such as one that is not finite, is refused.
  *
  * From the second update on nothing is allocated where the equilibrium is followed on its mesh and the board has neither
  * links nor bends. Beyond: the mesh changes, and with it the number of nodes, where the error of the shape asks for it,
  * unless solver.elements of the scenario fixes the mesh; that of a slender belt is graded anew at every update.
  */
 enum FishboneStatus fishbone_tracker_update(struct FishboneTracker *tracker,
-                                            const double *position,
-                                            const double *rotation,
+                                            const struct FishboneGoal *goals,
+                                            size_t count,
+                                            const struct FishboneLimits *limits,
                                             struct FishboneUpdate *update);
 
 /**

@@ -90,8 +90,16 @@ fn solved(toml: &str) -> Box<FishboneEquilibrium> {
     made(|place| fishbone_solve(Some(&scenario), place)).unwrap()
 }
 
+fn tracker_of(
+    equilibrium: Option<&FishboneEquilibrium>,
+    moving: &[usize],
+) -> Result<Box<FishboneTracker>, Failed> {
+    // SAFETY: the numbers are as many.
+    made(|place| unsafe { fishbone_tracker_new(equilibrium, moving.as_ptr(), moving.len(), place) })
+}
+
 fn tracker() -> Box<FishboneTracker> {
-    made(|place| fishbone_tracker_new(Some(&solved(BELT)), 1, place)).unwrap()
+    tracker_of(Some(&solved(BELT)), &[1]).unwrap()
 }
 
 fn update(
@@ -99,10 +107,23 @@ fn update(
     position: [f64; 3],
     angle: f64,
 ) -> Result<FishboneUpdate, Failed> {
-    let rotation = [0.0, 0.0, angle];
-    // SAFETY: three numbers each.
+    limited(tracker, position, angle, None)
+}
+
+fn limited(
+    tracker: &mut FishboneTracker,
+    position: [f64; 3],
+    angle: f64,
+    limits: Option<&FishboneLimits>,
+) -> Result<FishboneUpdate, Failed> {
+    let goal = FishboneGoal {
+        support: 1,
+        position,
+        rotation: [0.0, 0.0, angle],
+    };
+    // SAFETY: it is one goal.
     written(|place| unsafe {
-        fishbone_tracker_update(Some(tracker), position.as_ptr(), rotation.as_ptr(), place)
+        fishbone_tracker_update(Some(tracker), &raw const goal, 1, limits, place)
     })
 }
 
@@ -238,8 +259,12 @@ fn test_null_pointers_are_refused() {
     let mut outcome = MaybeUninit::uninit();
     // SAFETY: null pointers, which are refused, and vectors of three numbers.
     let refused = unsafe {
-        let zeros = [0.0; 3];
-        let zeros = zeros.as_ptr();
+        let goal = FishboneGoal {
+            support: 1,
+            position: [0.0, 0.5, 0.1],
+            rotation: [0.0; 3],
+        };
+        let (end, goal) = (&raw const goal.support, &raw const goal);
         [
             fishbone_scenario_load(null(), None),
             fishbone_scenario_from_toml(null(), None),
@@ -255,14 +280,14 @@ fn test_null_pointers_are_refused() {
             fishbone_equilibrium_bend(None, std::ptr::null_mut(), 0),
             fishbone_equilibrium_reaction(None, 0, None),
             fishbone_equilibrium_reaction(Some(&equilibrium), 0, None),
-            fishbone_tracker_new(None, 0, None),
-            fishbone_tracker_new(Some(&equilibrium), 0, None),
+            fishbone_tracker_new(None, end, 1, None),
+            fishbone_tracker_new(Some(&equilibrium), null(), 1, None),
+            fishbone_tracker_new(Some(&equilibrium), end, 1, None),
             fishbone_tracker_copy(None, None),
             fishbone_tracker_copy(Some(&tracker), None),
-            fishbone_tracker_update(None, zeros, zeros, Some(&mut outcome)),
-            fishbone_tracker_update(Some(&mut tracker), null(), zeros, Some(&mut outcome)),
-            fishbone_tracker_update(Some(&mut tracker), zeros, null(), Some(&mut outcome)),
-            fishbone_tracker_update(Some(&mut tracker), zeros, zeros, None),
+            fishbone_tracker_update(None, goal, 1, None, Some(&mut outcome)),
+            fishbone_tracker_update(Some(&mut tracker), null(), 1, None, Some(&mut outcome)),
+            fishbone_tracker_update(Some(&mut tracker), goal, 1, None, None),
             fishbone_tracker_energy(None, None),
             fishbone_tracker_nodes(None, None),
             fishbone_tracker_arc_lengths(None, std::ptr::null_mut(), 0),
@@ -340,13 +365,9 @@ fn test_a_belt_that_is_too_short_is_an_outcome_and_cannot_be_followed() {
     let outcome = written(|place| fishbone_equilibrium_status(Some(&short), place));
     assert_eq!(outcome, Ok(FishboneOutcome::FishboneInfeasible));
     assert_eq!(last_error(), "");
-    let refused = made(|place| fishbone_tracker_new(Some(&short), 1, place))
-        .err()
-        .unwrap();
+    let refused = tracker_of(Some(&short), &[1]).err().unwrap();
     assert_eq!(refused.0, FishboneNoTracker);
-    let nowhere = made(|place| fishbone_tracker_new(Some(&solved(BELT)), 7, place))
-        .err()
-        .unwrap();
+    let nowhere = tracker_of(Some(&solved(BELT)), &[7]).err().unwrap();
     assert_eq!(
         nowhere,
         (
@@ -373,6 +394,48 @@ fn test_a_pose_that_is_not_reached_leaves_the_tracker_where_it_is() {
         nan.1
     );
     assert_eq!(positions(&tracker), before);
+}
+
+#[test]
+fn test_an_update_that_its_limits_end_goes_on_with_the_next_one() {
+    let (mut tracker, mut at_once) = (tracker(), tracker());
+    let (position, angle) = ([0.05, 0.6, 0.05], 0.3);
+    let whole = update(&mut at_once, position, angle).unwrap();
+    let limits = FishboneLimits {
+        max_time: 0.0,
+        max_iterations: 10,
+    };
+    let mut fractions = Vec::new();
+    while fractions.last() != Some(&1.0) && fractions.len() < 100 {
+        let part = limited(&mut tracker, position, angle, Some(&limits)).unwrap();
+        fractions.push(part.fraction);
+        assert!(part.iterations <= 11);
+    }
+    assert!((2..100).contains(&fractions.len()), "{fractions:?}");
+    let mut energy = MaybeUninit::uninit();
+    assert_eq!(
+        fishbone_tracker_energy(Some(&tracker), Some(&mut energy)),
+        FishboneOk
+    );
+    // SAFETY: the call has succeeded.
+    assert!((unsafe { energy.assume_init() } / whole.energy - 1.0).abs() < 1e-9);
+    for max_time in [-1.0, f64::NAN, 1e-12] {
+        let none = FishboneLimits {
+            max_time,
+            max_iterations: 0,
+        };
+        let stopped = limited(&mut tracker, [0.0, 0.5, 0.1], 0.0, Some(&none)).unwrap();
+        assert_eq!(
+            (stopped.status, stopped.fraction),
+            (FishboneOutcome::FishboneNotConverged, 0.0)
+        );
+    }
+    let long = FishboneLimits {
+        max_time: f64::INFINITY,
+        max_iterations: 0,
+    };
+    let back = limited(&mut tracker, [0.0, 0.5, 0.1], 0.0, Some(&long)).unwrap();
+    assert_eq!(back.status, FishboneOutcome::FishboneConverged);
 }
 
 #[test]

@@ -1,17 +1,19 @@
-//! Trackers: an equilibrium that is followed while one of its supports moves.
+//! Trackers: an equilibrium that is followed while some of its supports move.
 
 use crate::boundary::{Refusal, call, copy, free, given, numbers, write, write_handle};
 use crate::equilibrium::{FishboneEquilibrium, FishboneWrench, checked_support, row_major};
 use crate::status::{FishboneOutcome, FishboneStatus, report};
-use fishbone::analysis::tracking::{NoTracker, Tracker, Update};
+use fishbone::analysis::tracking::{Budget, Goal, NoTracker, Tracker, Update};
 use fishbone::io::stored::{NotStored, Stored};
 use nalgebra::Vector3;
 use std::mem::MaybeUninit;
-use std::ops::ControlFlow;
+use std::time::Duration;
 
-/// An equilibrium and the support that moves.
+/// An equilibrium and the supports that move.
 pub struct FishboneTracker {
     moving: Tracker,
+    /// Room for the goals of an update.
+    goals: Vec<Goal>,
     /// Number of supports.
     supports: usize,
 }
@@ -20,6 +22,7 @@ impl From<Tracker> for FishboneTracker {
     fn from(moving: Tracker) -> Self {
         Self {
             supports: moving.supports().len(),
+            goals: Vec::new(),
             moving,
         }
     }
@@ -37,12 +40,61 @@ impl From<NotStored> for Refusal {
     }
 }
 
-/// The outcome of a motion of the support.
+/// Where a support goes.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FishboneGoal {
+    /// The support, by its place in the scenario, from 0.
+    pub support: usize,
+    /// Position, world axes.
+    pub position: [f64; 3],
+    /// Rotation vector, world axes; that of a support that holds no frame is not read.
+    pub rotation: [f64; 3],
+}
+
+impl From<&FishboneGoal> for Goal {
+    fn from(goal: &FishboneGoal) -> Self {
+        Self {
+            support: goal.support,
+            position: Some(Vector3::from(goal.position)),
+            rotation: Some(Vector3::from(goal.rotation)),
+        }
+    }
+}
+
+/// What an update may take; 0 is no limit.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FishboneLimits {
+    /// Time, in seconds: the update ends after the iteration in which it has passed.
+    pub max_time: f64,
+    /// Iterations.
+    pub max_iterations: usize,
+}
+
+impl From<&FishboneLimits> for Budget {
+    fn from(limits: &FishboneLimits) -> Self {
+        let time = Some(limits.max_time).filter(|seconds| *seconds != 0.0);
+        let iterations = Some(limits.max_iterations).filter(|most| *most != 0);
+        // A time that is negative or no number is none at all, and one beyond all measure no limit.
+        let time = time.map(|seconds| match seconds > 0.0 {
+            true => Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX),
+            false => Duration::ZERO,
+        });
+        Self::new(time, iterations)
+    }
+}
+
+/// The outcome of a motion of the supports.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FishboneUpdate {
-    /// Whether the belt is in equilibrium under the new pose; unless converged, the tracker keeps its last pose.
+    /// Whether the belt is in equilibrium at its goals; unless converged, the tracker is at a fraction of the way.
     pub status: FishboneOutcome,
+    /// Share of the way to the goals that was reached.
+    pub fraction: f64,
+    /// Whether the belt is pulled so straight that its shape does not determine all reactions: these are not a number.
+    pub taut: bool,
     /// Whether the equilibrium that was followed ceased to exist or to be stable on the way, or could not be followed, and
     /// the belt has snapped to another one.
     pub snapped: bool,
@@ -64,6 +116,8 @@ impl From<Update> for FishboneUpdate {
     fn from(update: Update) -> Self {
         Self {
             status: report(update.status, &update.message),
+            fraction: update.fraction,
+            taut: update.taut,
             snapped: update.snapped,
             solved_afresh: update.solved_afresh,
             iterations: update.iterations,
@@ -75,17 +129,19 @@ impl From<Update> for FishboneUpdate {
     }
 }
 
-/// Makes a tracker of an equilibrium that has converged to a minimum. The support that is to move is named by its place in
-/// the scenario, from 0, and holds a position and a rotation.
+/// Makes a tracker of an equilibrium that has converged to a minimum. The supports that are to move are named by their places
+/// in the scenario, from 0, and hold a position each.
 #[unsafe(no_mangle)]
-pub extern "C" fn fishbone_tracker_new(
+pub unsafe extern "C" fn fishbone_tracker_new(
     equilibrium: Option<&FishboneEquilibrium>,
-    support: usize,
+    supports: *const usize,
+    count: usize,
     tracker: Option<&mut MaybeUninit<*mut FishboneTracker>>,
 ) -> FishboneStatus {
     call(|| {
         let FishboneEquilibrium(equilibrium) = given(equilibrium, "an equilibrium")?;
-        let moving = Tracker::new(equilibrium, support)?;
+        // SAFETY: the head of the header has the rule for buffers.
+        let moving = Tracker::new(equilibrium, unsafe { numbers(supports, count) }?)?;
         write_handle(tracker, FishboneTracker::from(moving))
     })
 }
@@ -99,10 +155,10 @@ pub extern "C" fn fishbone_tracker_copy(
     call(|| write_handle(copy, FishboneTracker::from(held(tracker)?.moving.clone())))
 }
 
-/// Moves the support to a position and a rotation vector, three numbers each in world axes, and the belt with it.
+/// Moves supports to their goals, all together, and the belt with them; those without a goal stay. The limits may be null.
 ///
-/// A pose that the belt does not reach is no failure of the call: the status of the update has the outcome, and the tracker
-/// keeps its last pose. A pose that no scenario may hold, such as one that is not finite, is refused.
+/// Goals that the belt does not reach are no failure of the call: the status of the update has the outcome, and the tracker
+/// stays at the last equilibrium on the way. A pose that no scenario may hold, such as one that is not finite, is refused.
 ///
 /// From the second update on nothing is allocated where the equilibrium is followed on its mesh and the board has neither
 /// links nor bends. Beyond: the mesh changes, and with it the number of nodes, where the error of the shape asks for it,
@@ -110,16 +166,24 @@ pub extern "C" fn fishbone_tracker_copy(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fishbone_tracker_update(
     tracker: Option<&mut FishboneTracker>,
-    position: *const f64,
-    rotation: *const f64,
+    goals: *const FishboneGoal,
+    count: usize,
+    limits: Option<&FishboneLimits>,
     update: Option<&mut MaybeUninit<FishboneUpdate>>,
 ) -> FishboneStatus {
     call(|| {
-        let FishboneTracker { moving, .. } = given(tracker, "a tracker")?;
-        // SAFETY: the head of the header has the rule for vectors.
-        let [position, rotation] = unsafe { [vector(position)?, vector(rotation)?] };
+        let FishboneTracker {
+            moving,
+            goals: room,
+            ..
+        } = given(tracker, "a tracker")?;
         let place = given(update, "a place for the update")?;
-        let updated = moving.update(&position, &rotation, &mut || ControlFlow::Continue(()))?;
+        // SAFETY: the head of the header has the rule for buffers.
+        let goals = unsafe { numbers(goals, count) }?;
+        room.clear();
+        room.extend(goals.iter().map(Goal::from));
+        let mut budget = limits.map_or_else(|| Budget::new(None, None), Budget::from);
+        let updated = moving.update(room, &mut || budget.proceed())?;
         place.write(updated.into());
         Ok(())
     })
@@ -207,7 +271,9 @@ pub extern "C" fn fishbone_tracker_reaction(
     reaction: Option<&mut MaybeUninit<FishboneWrench>>,
 ) -> FishboneStatus {
     call(|| {
-        let FishboneTracker { moving, supports } = held(tracker)?;
+        let FishboneTracker {
+            moving, supports, ..
+        } = held(tracker)?;
         let support = checked_support(support, *supports)?;
         write(reaction, moving.reaction(support).into())
     })
@@ -255,15 +321,4 @@ pub extern "C" fn fishbone_tracker_free(tracker: Option<Box<FishboneTracker>>) {
 
 fn held(tracker: Option<&FishboneTracker>) -> Result<&FishboneTracker, Refusal> {
     given(tracker, "a tracker")
-}
-
-/// A vector of the caller.
-///
-/// # Safety
-///
-/// The pointer is null, or that to the first of three numbers.
-unsafe fn vector(first: *const f64) -> Result<Vector3<f64>, Refusal> {
-    // SAFETY: as is promised.
-    let numbers = unsafe { numbers(first, 3) }?;
-    Ok(Vector3::from_column_slice(numbers))
 }

@@ -2,7 +2,7 @@
 
 #![cfg(unix)]
 
-use fishbone::analysis::tracking::Tracker;
+use fishbone::analysis::tracking::{Goal, Tracker};
 use fishbone::problem::Problem;
 use fishbone::scenario::Scenario;
 use fishbone::solve::solve;
@@ -96,13 +96,16 @@ fn expected() -> String {
     let text = fs::read_to_string(Path::new(ROOT).join("scenarios/example1.toml")).unwrap();
     let problem = Problem::new(Scenario::from_toml(&text).unwrap()).unwrap();
     let go_on = &mut || ControlFlow::Continue(());
-    let mut tracker = Tracker::new(&solve(&problem, go_on), 1).unwrap();
+    let mut tracker = Tracker::new(&solve(&problem, go_on), &[1]).unwrap();
     let mut lines = String::new();
     for step in 1..=20 {
         let share = f64::from(step);
-        let position = Vector3::new(0.0, 0.5 + 0.005 * share, 0.1);
-        let rotation = Vector3::new(0.0, 0.0, 0.01 * share);
-        tracker.update(&position, &rotation, go_on).unwrap();
+        let goal = Goal {
+            support: 1,
+            position: Some(Vector3::new(0.0, 0.5 + 0.005 * share, 0.1)),
+            rotation: Some(Vector3::new(0.0, 0.0, 0.01 * share)),
+        };
+        tracker.update(&[goal], go_on).unwrap();
         let middle = tracker.positions().nth(tracker.nodes().len() / 2).unwrap();
         let [x, f] = [middle, tracker.reaction(1).force];
         lines += &format!("{step:2}  middle {:9.6} {:9.6} {:9.6}", x.x, x.y, x.z);

@@ -15,9 +15,8 @@ use nalgebra::{Matrix3, Vector3};
 use numpy::IntoPyArray;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyType};
-use std::ops::ControlFlow;
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// An equilibrium that is followed while some of its supports move.
 #[pyclass(frozen, module = "fishbone._core")]
@@ -106,25 +105,6 @@ fn goals(goals: &[Goal]) -> Vec<core::Goal> {
     goals.iter().map(goal).collect()
 }
 
-/// What an update may take.
-struct Budget {
-    end: Option<Instant>,
-    iterations: Option<usize>,
-}
-
-impl Budget {
-    /// Whether to go on with one iteration more.
-    fn proceed(&mut self) -> ControlFlow<()> {
-        let is_late = self.end.is_some_and(|end| Instant::now() >= end);
-        let is_spent = self.iterations == Some(0);
-        if is_late || is_spent {
-            return ControlFlow::Break(());
-        }
-        self.iterations = self.iterations.map(|left| left - 1);
-        ControlFlow::Continue(())
-    }
-}
-
 impl Tracker {
     /// Copies a part of the shape. No object of Python is made meanwhile: this may run other Python code.
     fn read<T>(&self, part: impl FnOnce(&Shown) -> T) -> T {
@@ -199,10 +179,9 @@ impl Tracker {
         max_iterations: Option<usize>,
         check_crossing: bool,
     ) -> PyResult<Updated> {
-        let mut budget = Budget {
-            end: max_time.map(|seconds| Instant::now() + Duration::from_secs_f64(seconds)),
-            iterations: max_iterations,
-        };
+        let time =
+            max_time.map(|seconds| Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX));
+        let mut budget = core::Budget::new(time, max_iterations);
         let update = self.moving.with(py, |tracker, signals| {
             let update = tracker.update(&goals(&to), &mut || {
                 signals.proceed()?;

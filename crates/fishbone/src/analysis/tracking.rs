@@ -1,5 +1,6 @@
 //! Tracking: an equilibrium is followed at the rate of a robot while some of its supports move.
 
+mod budget;
 mod led;
 
 use crate::equilibrium::{AnySolved, Equilibrium, Status, Uncertified};
@@ -8,6 +9,7 @@ use crate::names::named;
 use crate::scenario::error::ScenarioError;
 use crate::strip::developable::DevelopableEnergy;
 use crate::strip::shell::{FIELDS, Shell};
+pub use budget::Budget;
 use led::Led;
 use nalgebra::{Matrix3, Vector3};
 use stagewise::Residuals;
@@ -134,7 +136,7 @@ impl Tracker {
     /// Nothing is allocated where the equilibrium is followed on its mesh and the board has neither links nor bends. Unless the
     /// scenario fixes the mesh, its error is estimated where turning changes more within an element than before, and the belt
     /// goes on on another mesh where this one carries it no more; the mesh of a slender belt is graded anew at every update.
-    /// `proceed` is asked once an iteration whether to go on; `Break` leaves the tracker at the last equilibrium on the way.
+    /// `proceed`, such as that of a [`Budget`], is asked once an iteration whether to go on; `Break` leaves the tracker at the last equilibrium on the way.
     ///
     /// # Errors
     ///

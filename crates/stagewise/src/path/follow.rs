@@ -34,6 +34,8 @@ pub struct Follower<P: Program<X, U, N>, const X: usize, const U: usize, const N
     first: Stationary<P::Point>,
     /// Room for the gradients of the equalities at nodes.
     gradients: Vec<NodeVector<N>>,
+    /// Length of the stride with which a way that was interrupted goes on.
+    next_stride: Option<f64>,
 }
 
 /// Settings of a follower.
@@ -80,6 +82,7 @@ where
             iterate,
             settings,
             last: minimum.clone(),
+            next_stride: None,
         };
         let started = follower.start_from(minimum);
         follower.keep();
@@ -120,7 +123,8 @@ where
     /// stride, or in shorter strides where a stride might lose the minimum. Where the minimum ends, the next minimum downhill
     /// takes its place. Where the minimum is lost, or on `Break`, the programme ends at the share of the last minimum.
     ///
-    /// `proceed` is called once a Newton step, and interrupts by `Break`.
+    /// `proceed` is called once a Newton step, and interrupts by `Break`. The next way then begins with the stride that this one
+    /// would have gone on with, so that ways of few steps come on, too.
     pub fn follow(
         &mut self,
         length: f64,
@@ -134,7 +138,10 @@ where
         const MOST_LEAPS: usize = 20;
         let mut way = Way {
             done: 0.0,
-            stride: 1.0,
+            stride: self
+                .next_stride
+                .take()
+                .map_or(1.0, |stride| (stride / length).min(1.0)),
             iterations: 0,
             leaps: 0,
             jump: 0.0,
@@ -142,7 +149,11 @@ where
         };
         let hidden = self.settings.smallest_jump / (SMOOTH * length);
         let shortest = hidden.clamp(SHORTEST_STRIDES[0], SHORTEST_STRIDES[1]);
-        while way.done < 1.0 && way.leaps < MOST_LEAPS && proceed().is_continue() {
+        while way.done < 1.0 && way.leaps < MOST_LEAPS {
+            if proceed().is_break() {
+                self.next_stride = Some(way.stride * length);
+                break;
+            }
             let next = (way.done + way.stride).min(1.0);
             change(&mut self.iterate.program, next);
             let (iterations, kept) = self.stride(proceed);
@@ -250,6 +261,16 @@ where
         self.iterate.linearise();
         self.factorise();
         solution
+    }
+
+    /// Length of the stride with which the next way begins, after one that was interrupted.
+    pub fn next_stride(&self) -> Option<f64> {
+        self.next_stride
+    }
+
+    /// Sets the length of the stride with which the next way begins.
+    pub fn set_next_stride(&mut self, stride: Option<f64>) {
+        self.next_stride = stride;
     }
 
     /// Makes the present minimum the one to return to.

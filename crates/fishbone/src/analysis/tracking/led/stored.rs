@@ -20,6 +20,7 @@ struct Stored<B, P, A, M, O, S, L> {
     at: A,
     moving: M,
     poses: O,
+    next_stride: Option<f64>,
     watched: f64,
     sound: S,
     flat: L,
@@ -37,6 +38,7 @@ where
             at: self.follower.minimum(),
             moving: &self.moving,
             poses: &self.poses,
+            next_stride: self.follower.next_stride(),
             watched: self.watched,
             sound: &self.sound,
             flat: &self.flat,
@@ -61,8 +63,10 @@ where
             Option<Flat>,
         > = Deserialize::deserialize(deserializer)?;
         let follower = Self::follower(&stored.problem, stored.program, &stored.at);
+        let mut follower = follower.map_err(R::Error::custom)?;
+        follower.set_next_stride(stored.next_stride);
         Ok(Self {
-            follower: follower.map_err(R::Error::custom)?,
+            follower,
             is_graded_anew: D::is_graded_anew(&stored.problem),
             problem: stored.problem,
             moving: stored.moving,
