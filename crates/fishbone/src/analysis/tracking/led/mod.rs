@@ -10,7 +10,7 @@ use crate::equilibrium::model::{StripModel, snapped_from};
 use crate::equilibrium::{Equilibrium, Solved, Status, flat_pose, from_guess, largest_change};
 use crate::geometry::{Pose, Wrench, exp, log};
 use crate::problem::program::{BeltPoint, BeltProgram};
-use crate::problem::{Mesh, Problem, Units};
+use crate::problem::{Mesh, Problem, Shape, Units};
 use crate::scenario::error::ScenarioError;
 use crate::scenario::{Scenario, SegmentSpec, SupportSpec};
 use nalgebra::{SVector, Vector3};
@@ -41,6 +41,8 @@ pub(super) struct Led<D: StripModel<F, N>, const F: usize, const N: usize> {
     pose: Pose,
     /// Pose of the support at which the board lies flat and at rest, in the units of the programme.
     flat: Option<Pose>,
+    /// Room for the shape by which the active sets are judged; `None` where they do not depend on it.
+    shape: Option<Shape>,
     /// Difference between the scenario's potential and the programme's, for their origins.
     potential_of_origin: f64,
 }
@@ -73,6 +75,7 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
                 position: (position - origin) / units.length,
             },
             flat: flat_pose(&problem, &solved.program, support),
+            shape: D::shape(&problem, &solved.program, point),
             potential_of_origin: equilibrium.energy - stored * units.energy,
             problem,
             follower,
@@ -475,9 +478,12 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
         }
     }
 
-    fn is_settled(&self) -> bool {
-        let (program, point) = (self.follower.program(), self.follower.point());
-        D::active_set_fault(&self.problem, program, point).is_none()
+    fn is_settled(&mut self) -> bool {
+        let Some(shape) = &mut self.shape else {
+            return true;
+        };
+        shape.move_to(&self.problem, self.follower.point());
+        D::active_set_fault(self.follower.program(), shape).is_none()
     }
 
     fn return_to_start(&mut self) {

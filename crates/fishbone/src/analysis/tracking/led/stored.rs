@@ -55,8 +55,10 @@ where
             Stationary<BeltPoint<F>>,
             Vec<SVector<f64, F>>,
         > = Deserialize::deserialize(deserializer)?;
+        let shape = D::shape(&stored.problem, &stored.program, &stored.at.point);
         let follower = Self::follower(&stored.problem, stored.program, &stored.at);
         Ok(Self {
+            shape,
             follower: follower.map_err(R::Error::custom)?,
             is_graded_anew: D::is_graded_anew(&stored.problem),
             problem: stored.problem,
