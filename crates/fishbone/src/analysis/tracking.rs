@@ -118,10 +118,10 @@ impl Tracker {
 
     /// Moves the support to a position and a rotation vector, world axes, and the belt with it.
     ///
-    /// Nothing is allocated where the equilibrium is followed on its mesh and the board has neither links nor bends. Unless the
-    /// scenario fixes the mesh, its error is estimated where turning changes more within an element than before, and the belt
-    /// goes on on another mesh where this one carries it no more; the mesh of a slender belt is graded anew at every update.
-    /// `proceed` is asked during the motion whether to go on; `Break` leaves the tracker at its last pose.
+    /// Nothing is allocated after the first update where the equilibrium is followed on its mesh and its ribs keep to the edges
+    /// of the board that bound them. Unless the scenario fixes the mesh, its error is estimated where turning changes more
+    /// within an element than before, and the belt goes on on another mesh where this one carries it no more; the mesh of a
+    /// slender belt is graded anew at every update. `proceed` is asked during the motion whether to go on; `Break` leaves the tracker at its last pose.
     ///
     /// # Errors
     ///
