@@ -112,7 +112,7 @@ pub(super) fn slope_jets<const K: usize>(
     slopes: [f64; 2],
     functions: impl Fn([HyperDual64; 2]) -> [HyperDual64; K],
 ) -> [SlopeJet; K] {
-    // Three times numbers that carry one second derivative each: these take a third of the time of those that carry all.
+    // Three times numbers that carry one second derivative each take less time than once numbers that carry all.
     let [first, mixed, second] = [[0, 0], [0, 1], [1, 1]].map(|[i, j]| {
         let mut slopes = slopes.map(HyperDual64::from);
         (slopes[i].eps1, slopes[j].eps2) = (1.0, 1.0);
