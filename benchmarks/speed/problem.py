@@ -20,6 +20,8 @@ Floats = NDArray[np.float64]
 Energy: TypeAlias = EnergyModel
 
 EXAMPLES = ("example1", "example2")
+TRACKED = (*EXAMPLES, "curved")
+"""Scenarios whose end goes along a path: straight boards, and one that is an arc."""
 ENERGIES: tuple[Energy, ...] = get_args(EnergyModel)
 LENGTH, WIDTH = 1.0, 0.1
 SHEET = {"thickness": 7e-4, "poisson": 0.34}
@@ -80,11 +82,11 @@ def end_pose(example: str) -> Pose:
 
 
 def path(example: str, count: int) -> Iterator[Pose]:
-    """A smooth closed path of end poses around that of an example, through it at first and at last; always the same.
+    """A smooth closed path of end poses around that of a scenario, through it at first and at last; always the same.
 
     Each component is a sum of a few sines of falling amplitude, which starts and ends at 0.
     """
-    rng = np.random.default_rng(EXAMPLES.index(example))
+    rng = np.random.default_rng(TRACKED.index(example))
     waves = np.arange(1, WAVES + 1)
     amplitudes = rng.uniform(-1.0, 1.0, (6, WAVES)) / waves
     phases = rng.uniform(0.0, 2.0 * np.pi, (6, WAVES))

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 COARSE = 80
 """Elements of the mesh from whose solution finer meshes are solved."""
+TRACKED = {"energy": "wunderlich", "solver": {"elements": 80}}
+"""Density and mesh of a tracker, the same for boards of any outline."""
 REPETITIONS = 5
 
 
@@ -84,7 +86,7 @@ def solve(example: str, times: str) -> dict[str, Any]:
 def update(example: str, times: str) -> dict[str, Any]:
     """The first so many updates of a tracker, through poses that are read; all are read in any case."""
     poses = json.load(sys.stdin)
-    tracker = fb.Tracker(_example(example))
+    tracker = fb.Tracker(fb.Scenario.from_dict(_example(example).to_dict() | TRACKED))
     return {"iterations": [tracker.update(*pose).iterations for pose in poses[: int(times)]]}
 
 

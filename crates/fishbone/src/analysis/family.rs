@@ -156,7 +156,8 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Along<D, F, N> {
     pub(super) fn holds(&self, station: &Station<F, N>) -> bool {
         self.meshed(station.parameter)
             .is_some_and(|(problem, program)| {
-                let fault = D::active_set_fault(&problem, &program, &station.at.point);
+                let shape = D::shape(&problem, &program, &station.at.point);
+                let fault = shape.and_then(|shape| D::active_set_fault(&program, &shape));
                 fault.is_none()
             })
     }

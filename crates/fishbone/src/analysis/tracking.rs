@@ -133,10 +133,11 @@ impl Tracker {
 
     /// Moves supports to their goals, together and each straight to its own, and the belt with them.
     ///
-    /// Nothing is allocated where the equilibrium is followed on its mesh and the board has neither links nor bends. Unless the
-    /// scenario fixes the mesh, its error is estimated where turning changes more within an element than before, and the belt
-    /// goes on on another mesh where this one carries it no more; the mesh of a slender belt is graded anew at every update.
-    /// `proceed`, such as that of a [`Budget`], is asked once an iteration whether to go on; `Break` leaves the tracker at the last equilibrium on the way.
+    /// Nothing is allocated after the first update where the equilibrium is followed on its mesh and its ribs keep to the edges
+    /// of the board that bound them. Unless the scenario fixes the mesh, its error is estimated where turning changes more
+    /// within an element than before, and the belt goes on on another mesh where this one carries it no more; the mesh of a
+    /// slender belt is graded anew at every update. `proceed`, such as that of a [`Budget`], is asked once an iteration whether
+    /// to go on; `Break` leaves the tracker at the last equilibrium on the way.
     ///
     /// # Errors
     ///

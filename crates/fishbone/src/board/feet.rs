@@ -10,21 +10,35 @@ use std::f64::consts::FRAC_PI_2;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Foot {
     pub(crate) point: SpinePoint,
-    /// Frame of the foot in the flat board.
-    pub(crate) flat: FlatFrame,
+    pub(crate) rib: FlatRib,
+}
+
+/// A rib on the flat board.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct FlatRib {
+    /// Frame of its foot.
+    pub(crate) foot: FlatFrame,
+    /// Rib slope β.
+    pub(crate) slope: f64,
     /// Segment of the chains on which the foot lies.
     owner: usize,
 }
 
-impl Foot {
+impl FlatRib {
     /// Distance along the spine by which the rib passes ahead of a flat point.
     pub(crate) fn excess(&self, point: &Vector2<f64>) -> f64 {
-        excess(&self.flat, self.point.rib_slope, point)
+        excess(&self.foot, self.slope, point)
     }
 
-    /// Angle of the flat rib's normal from the y axis: the heading, turned by the rib angle α.
+    /// Vector along the rib, of length 1 across the spine.
+    pub(crate) fn direction(&self) -> Vector2<f64> {
+        let along = Vector2::new(-self.slope, 1.0);
+        self.foot.global(&along) - self.foot.position
+    }
+
+    /// Angle of the rib's normal from the y axis: the heading, turned by the rib angle α.
     fn normal_angle(&self) -> f64 {
-        self.flat.heading + self.point.rib_slope.atan()
+        self.foot.heading + self.slope.atan()
     }
 }
 
@@ -74,7 +88,15 @@ impl Board {
     pub(crate) fn foot_at_node(&self, spine: &Spine, node: usize) -> Foot {
         Foot {
             point: spine.node(node),
-            flat: self.flat.nodes[node],
+            rib: self.rib_at_node(spine, node),
+        }
+    }
+
+    /// The rib at a node.
+    pub(crate) fn rib_at_node(&self, spine: &Spine, node: usize) -> FlatRib {
+        FlatRib {
+            foot: self.flat.nodes[node],
+            slope: spine.rib_slope[node],
             owner: self.chains.own[0] + self.flat.owner[node],
         }
     }
@@ -86,7 +108,16 @@ impl Board {
         }
         Foot {
             point: spine.within(element, distance),
-            flat: self.frame_within(spine, element, distance),
+            rib: self.rib_within(spine, element, distance),
+        }
+    }
+
+    /// The rib inside an element of some length, a distance after its first node.
+    pub(crate) fn rib_within(&self, spine: &Spine, element: usize, distance: f64) -> FlatRib {
+        let (_, slope) = spine.fields(element, distance);
+        FlatRib {
+            foot: self.frame_within(spine, element, distance),
+            slope,
             owner: self.chains.own[0] + self.flat.owner[element + 1],
         }
     }
@@ -114,30 +145,33 @@ impl Board {
     ///
     /// An end within the tolerance of a vertex is put on it: a rib that a solver left square to ten digits ends at
     /// the corners of the board and not on its end line.
-    pub(crate) fn ends(&self, foot: &Foot) -> [End; 2] {
-        [0, 1].map(|side| {
-            let window = Window::new(&self.chains, side, foot);
-            let mut end = window.end(&foot.flat.position, self.tolerance());
-            let v = foot.flat.local(&end.flat).y;
-            end.v = if side == 0 { v.min(0.0) } else { v.max(0.0) };
-            end
-        })
+    pub(crate) fn ends(&self, rib: &FlatRib) -> [End; 2] {
+        [0, 1].map(|side| self.end(rib, side))
+    }
+
+    /// The end of a rib on one side, as [`Self::ends`].
+    pub(crate) fn end(&self, rib: &FlatRib, side: usize) -> End {
+        let window = Window::new(&self.chains, side, rib);
+        let mut end = window.end(&rib.foot.position, self.tolerance());
+        let v = rib.foot.local(&end.flat).y;
+        end.v = if side == 0 { v.min(0.0) } else { v.max(0.0) };
+        end
     }
 
     /// Depth of a flat point inside the edge on one side, in the direction of a rib; `None` beyond the edge's end.
-    pub(crate) fn depth(&self, foot: &Foot, side: usize, point: &Vector2<f64>) -> Option<f64> {
-        let window = Window::new(&self.chains, side, foot);
+    pub(crate) fn depth(&self, rib: &FlatRib, side: usize, point: &Vector2<f64>) -> Option<f64> {
+        let window = Window::new(&self.chains, side, rib);
         let end = window.hit(point, self.tolerance())?;
-        let outwards = direction(foot.normal_angle() + FRAC_PI_2.copysign(side as f64 - 0.5));
+        let outwards = direction(rib.normal_angle() + FRAC_PI_2.copysign(side as f64 - 0.5));
         Some(outwards.dot(&(end.flat - point)))
     }
 
-    /// The edges of a side in three runs: behind the foot, beside the foot (empty where the outline has no edge there),
+    /// The edges of a side in three runs: behind a rib's foot, beside the foot (empty where the outline has no edge there),
     /// ahead of the foot. Lines across the ends of the board are left out.
-    pub(crate) fn edges_beside(&self, side: usize, foot: &Foot) -> [&[Edge]; 3] {
+    pub(crate) fn edges_beside(&self, side: usize, rib: &FlatRib) -> [&[Edge]; 3] {
         let chain = self.chains.edges[side].as_slice();
         let ends = usize::from(self.chains.is_open);
-        let (own, is_there) = nearest_piece(&self.chains, side, foot);
+        let (own, is_there) = nearest_piece(&self.chains, side, rib);
         let ahead = own + usize::from(is_there);
         [
             &chain[ends..own],
@@ -167,7 +201,7 @@ impl Board {
             return Vec::new();
         }
         let [before, after] =
-            [element, element + 1].map(|node| self.ends(&self.foot_at_node(spine, node)));
+            [element, element + 1].map(|node| self.ends(&self.rib_at_node(spine, node)));
         let mut distances: Vec<f64> = (0..2)
             .flat_map(|side| self.vertices_between(side, before[side].place, after[side].place))
             .filter_map(|vertex| self.distance_to(spine, element, &vertex))
@@ -187,7 +221,7 @@ impl Board {
             let (_, slope) = spine.fields(element, distance);
             excess(&self.frame_within(spine, element, distance), slope, point)
         };
-        let ahead = |node: usize| self.foot_at_node(spine, node).excess(point);
+        let ahead = |node: usize| self.rib_at_node(spine, node).excess(point);
         let (mut low, mut high) = (0.0, spine.element_length(element));
         if !(ahead(element) <= 0.0 && ahead(element + 1) >= 0.0) {
             return None;
@@ -204,10 +238,10 @@ impl Board {
     }
 
     /// Whether a flat point lies on the part of a rib's line that is on the board.
-    pub(crate) fn is_on_rib(&self, foot: &Foot, point: &Vector2<f64>) -> bool {
-        let [minus, plus] = self.ends(foot);
+    pub(crate) fn is_on_rib(&self, rib: &FlatRib, point: &Vector2<f64>) -> bool {
+        let [minus, plus] = self.ends(rib);
         let margin = self.tolerance();
-        (minus.v - margin..=plus.v + margin).contains(&foot.flat.local(point).y)
+        (minus.v - margin..=plus.v + margin).contains(&rib.foot.local(point).y)
     }
 
     /// The side on which the end of an open belt has a corner that its last rib leaves out, with that rib's end.
@@ -253,6 +287,8 @@ struct Window<'a> {
     chain: &'a [Edge],
     /// Angle of the rib's normal.
     angle: f64,
+    /// The rib's normal, a unit vector.
+    normal: Vector2<f64>,
     /// The piece beside the foot.
     start: usize,
     /// The first piece ahead of the foot.
@@ -264,11 +300,13 @@ struct Window<'a> {
 type Facing = (usize, [f64; 2]);
 
 impl<'a> Window<'a> {
-    fn new(chains: &'a Chains, side: usize, foot: &Foot) -> Self {
-        let (start, is_own) = nearest_piece(chains, side, foot);
+    fn new(chains: &'a Chains, side: usize, rib: &FlatRib) -> Self {
+        let (start, is_own) = nearest_piece(chains, side, rib);
+        let angle = rib.normal_angle();
         Self {
             chain: chains.edges[side].as_slice(),
-            angle: foot.normal_angle(),
+            angle,
+            normal: direction(angle),
             start,
             next: start + usize::from(is_own),
             is_open: chains.is_open,
@@ -339,7 +377,7 @@ impl<'a> Window<'a> {
 
     /// Distance of a flat point from the rib's line, forwards.
     fn ahead(&self, point: &Vector2<f64>, of: &Vector2<f64>) -> f64 {
-        direction(self.angle).dot(&(point - of))
+        self.normal.dot(&(point - of))
     }
 
     fn end_at(&self, index: usize, fraction: f64) -> End {
@@ -356,16 +394,18 @@ impl<'a> Window<'a> {
     /// counts.
     fn snapped(&self, end: End, point: &Vector2<f64>, tolerance: f64) -> End {
         let index = (end.place.floor() as usize).min(self.chain.len() - 1);
-        let mut corners = [0.0, 1.0].map(|at| self.end_at(index, at)).into_iter();
-        let is_near = |corner: &End| (corner.flat - end.flat).norm() <= tolerance;
+        let corner = || {
+            let (length, passed) = (self.chain[index].curve.length(), end.place - index as f64);
+            let is_near = |at: &f64| length * (at - passed).abs() <= tolerance;
+            let at = [0.0, 1.0].into_iter().find(is_near)?;
+            Some(self.end_at(index, at))
+        };
         let along_end_line = || {
             let (corner, heading) = self.corner_of_end_line(index)?;
             let reach = tolerance * (heading - self.angle).cos();
             (self.ahead(&corner.flat, point).abs() <= reach).then_some(corner)
         };
-        along_end_line()
-            .or_else(|| corners.find(is_near))
-            .unwrap_or(end)
+        along_end_line().or_else(corner).unwrap_or(end)
     }
 
     /// The corner at which an end line meets the edge, and the heading of the edge there.
@@ -406,9 +446,15 @@ impl<'a> Window<'a> {
                 if a < 0.0 { a / (a - b) } else { 0.0 }
             }
             Some(_) => {
+                // From the first facing point on: the sine of the arc's angle to the normal changes by curvature times
+                // distance ahead, its cosine is positive, and half the turn has the tangent of their differences' ratio.
                 let edge = &self.chain[index];
-                let rate = |at: f64| edge.curve.length() * (edge.direction(at) - self.angle).cos();
-                root(|at| (ahead(index, at), rate(at)), from, to)
+                let turn = edge.curve.turn();
+                let (sine, cosine) = (edge.direction(from) - self.angle).sin_cos();
+                let change = -turn / edge.curve.length() * ahead(index, from);
+                let there = (1.0 - (sine + change).powi(2)).max(0.0).sqrt();
+                let half = change.atan2(cosine + there);
+                (from + 2.0 * half / turn).clamp(from, to)
             }
         };
         Some(self.end_at(index, fraction))
@@ -438,25 +484,25 @@ impl<'a> Window<'a> {
         let gap = |end: &End| self.ahead(&end.flat, point);
         let nearer = if gap(&a).abs() < gap(&b).abs() { a } else { b };
         End {
-            flat: nearer.flat - gap(&nearer) * direction(self.angle),
+            flat: nearer.flat - gap(&nearer) * self.normal,
             ..nearer
         }
     }
 }
 
-/// The index of the piece of an edge beside a foot, and whether the outline has a piece there; if not, the index is the next
-/// piece's.
-fn nearest_piece(chains: &Chains, side: usize, foot: &Foot) -> (usize, bool) {
+/// The index of the piece of an edge beside the foot of a rib, and whether the outline has a piece there; if not, the index is
+/// the next piece's.
+fn nearest_piece(chains: &Chains, side: usize, rib: &FlatRib) -> (usize, bool) {
     let chain = &chains.edges[side];
     let ends = usize::from(chains.is_open);
     let inner = &chain[ends..chain.len() - ends];
     // Along a chain the segments come in order.
-    let own = ends + inner.partition_point(|edge| edge.owner < foot.owner);
-    let after = ends + inner.partition_point(|edge| edge.owner <= foot.owner);
+    let own = ends + inner.partition_point(|edge| edge.owner < rib.owner);
+    let after = ends + inner.partition_point(|edge| edge.owner <= rib.owner);
     let distance = |&index: &usize| {
         let edge = &chain[index];
         let (a, b) = (edge.heading, edge.heading + edge.curve.turn());
-        let heading = foot.flat.heading;
+        let heading = rib.foot.heading;
         (heading - heading.clamp(a.min(b), a.max(b))).abs()
     };
     let nearest = (own..after).min_by(|a, b| distance(a).total_cmp(&distance(b)));
@@ -464,29 +510,4 @@ fn nearest_piece(chains: &Chains, side: usize, foot: &Foot) -> (usize, bool) {
         Some(index) => (index, true),
         None => (after, false),
     }
-}
-
-/// The root of a rising function between a and b, given with its derivative: by Newton's method, or by halving where a step
-/// would leave the bounds.
-fn root(f: impl Fn(f64) -> (f64, f64), mut a: f64, mut b: f64) -> f64 {
-    /// Largest count of steps, a number; halving alone leaves rounding.
-    const STEPS: usize = 64;
-    /// Step of Newton's method of which the square is rounding; in the unit of a and b.
-    const LAST: f64 = 1e-9;
-    let mut at = 0.5 * (a + b);
-    for _ in 0..STEPS {
-        let (value, rate) = f(at);
-        if value < 0.0 {
-            a = at;
-        } else {
-            b = at;
-        }
-        let newton = at - value / rate;
-        let is_inside = a <= newton && newton <= b;
-        if is_inside && (newton - at).abs() <= LAST {
-            return newton;
-        }
-        at = if is_inside { newton } else { 0.5 * (a + b) };
-    }
-    at
 }

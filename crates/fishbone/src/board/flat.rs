@@ -28,8 +28,7 @@ impl FlatFrame {
 
     /// Unit vector across, ζ of the flat board.
     pub(crate) fn across(&self) -> Vector2<f64> {
-        let tangent = self.tangent();
-        Vector2::new(-tangent.y, tangent.x)
+        quarter_turned(&self.tangent())
     }
 
     /// The frame a distance on along an arc of given curvature.
@@ -44,13 +43,14 @@ impl FlatFrame {
 
     /// Coordinates of a flat point in this frame: along and across.
     pub(crate) fn local(&self, point: &Vector2<f64>) -> Vector2<f64> {
-        let offset = point - self.position;
-        Vector2::new(self.tangent().dot(&offset), self.across().dot(&offset))
+        let (offset, tangent) = (point - self.position, self.tangent());
+        Vector2::new(tangent.dot(&offset), tangent.perp(&offset))
     }
 
     /// The flat point of given coordinates in this frame.
     pub(crate) fn global(&self, local: &Vector2<f64>) -> Vector2<f64> {
-        self.position + local.x * self.tangent() + local.y * self.across()
+        let tangent = self.tangent();
+        self.position + local.x * tangent + local.y * quarter_turned(&tangent)
     }
 }
 
@@ -58,6 +58,11 @@ impl FlatFrame {
 pub(crate) fn direction(angle: f64) -> Vector2<f64> {
     let (sine, cosine) = angle.sin_cos();
     Vector2::new(cosine, sine)
+}
+
+/// A vector turned by a right angle, from y towards z.
+fn quarter_turned(vector: &Vector2<f64>) -> Vector2<f64> {
+    Vector2::new(-vector.y, vector.x)
 }
 
 /// A stretch of the flat spine of one in-plane curvature.

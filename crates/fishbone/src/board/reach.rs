@@ -1,11 +1,10 @@
 //! The reach of ribs over the board, and the edges on which they may end.
 
-use crate::board::feet::{Board, Foot};
+use crate::board::feet::{Board, FlatRib};
 use crate::board::flat::direction;
 use crate::board::outline;
 use crate::strip::bounds::{ActiveEdges, Edge};
 use crate::strip::spine::{Piece, Spine};
-use nalgebra::Vector2;
 use std::f64::consts::PI;
 
 /// Depth of 1 − s v below 0 from which ribs count as crossing, dimensionless: rounding alone moves ribs that just touch by
@@ -14,84 +13,70 @@ const TOUCHING: f64 = 1e-4;
 /// Turn of the outline up to which it counts as straight, in rad.
 const STRAIGHT: f64 = 1e-9;
 
-/// The elements whose ribs cross on the board: the rib in the middle of the element with its neighbours, or the ribs at its
-/// two ends with each other. A straight board has none: the bound |s| ≤ 2/V covers its ribs.
-///
-/// # Panics
-///
-/// If the spine has no nodes.
-pub(crate) fn crossings(spine: &Spine) -> Vec<usize> {
+/// The first element whose ribs cross on the board: the rib in the middle of the element with its neighbours, or the ribs at
+/// its two ends with each other. A straight board has none: the bound |s| ≤ 2/V covers its ribs.
+pub(crate) fn first_crossing(board: &Board, spine: &Spine) -> Option<usize> {
     let bends = |piece: &Piece| piece.geodesic() != 0.0 || piece.corner() != 0.0;
     if !spine.pieces.iter().any(bends) {
-        return Vec::new();
+        return None;
     }
-    let board = Board::of(spine);
-    let crosses = |element: &usize| {
-        let s = spine.mean_convergence(*element);
-        let ends = board.ends(&middle(spine, &board, *element));
-        ends.iter().any(|end| s * end.v > 1.0 + TOUCHING)
-            || cross(
-                &board,
-                [0, 1].map(|i| board.foot_at_node(spine, element + i)),
-            )
-    };
-    spine.strips().filter(crosses).collect()
+    spine
+        .strips()
+        .find(|element| crosses(board, spine, *element))
+}
+
+/// Whether ribs of an element cross on the board.
+fn crosses(board: &Board, spine: &Spine, element: usize) -> bool {
+    let s = spine.mean_convergence(element);
+    let end = board.end(&middle(board, spine, element), side_of(s));
+    let ribs = || [0, 1].map(|i| board.rib_at_node(spine, element + i));
+    s * end.v > 1.0 + TOUCHING || cross(board, ribs())
 }
 
 /// Whether two ribs cross clearly inside the board. On an arc the bound holds in the middle of an element; at its ends it is
 /// missed by a part that grows with the element's length.
-fn cross(board: &Board, feet: [Foot; 2]) -> bool {
+fn cross(board: &Board, ribs: [FlatRib; 2]) -> bool {
     /// Part of a rib, from the spine towards its end, on which a crossing counts as inside, a share.
     const INSIDE: f64 = 0.95;
-    let directions = feet.map(|foot| {
-        let along = Vector2::new(-foot.point.rib_slope, 1.0);
-        foot.flat.global(&along) - foot.flat.position
-    });
-    let gap = feet[1].flat.position - feet[0].flat.position;
+    let directions = ribs.map(|rib| rib.direction());
+    let gap = ribs[1].foot.position - ribs[0].foot.position;
     let parallel = directions[0].perp(&directions[1]);
     let v = [1, 0].map(|other: usize| gap.perp(&directions[other]) / parallel);
     parallel != 0.0
-        && feet.iter().zip(v).all(|(foot, v)| {
-            let [minus, plus] = board.ends(foot);
-            (INSIDE * minus.v..INSIDE * plus.v).contains(&v)
+        && ribs.iter().zip(v).all(|(rib, v)| {
+            let end = board.end(rib, side_of(v));
+            v.abs() < INSIDE * end.v.abs()
         })
 }
 
-/// The active edges of every flexible element: edges before which its ribs must not cross, in addition to |s| ≤ 2/V. Where
-/// the outline turns inwards ribs pass the end of their own edge and reach an edge farther on, on the −ζ or on the +ζ side;
-/// of several edges in reach the one nearest to a crossing is active. Last comes the inner edge of the element's own arc,
-/// which very steep ribs may pass by.
-///
-/// # Panics
-///
-/// If the spine has no nodes.
-pub(crate) fn edges_in_reach(spine: &Spine) -> Vec<(usize, ActiveEdges)> {
-    let board = Board::of(spine);
-    let edges = |element: usize| {
-        let rib = MiddleRib {
-            foot: middle(spine, &board, element),
-            convergence: spine.mean_convergence(element),
-            length: spine.element_length(element),
-        };
-        let [minus, plus] = [0, 1].map(|side| rib.nearest_edge(&board, side));
-        let own = [0, 1]
-            .into_iter()
-            .find_map(|side| rib.own_arc(&board, side));
-        [minus, plus, own]
-    };
-    spine
-        .strips()
-        .map(|element| (element, edges(element)))
-        .collect()
+/// The side on which a coordinate along a rib lies: 0 of −ζ, 1 of +ζ.
+fn side_of(v: f64) -> usize {
+    usize::from(v > 0.0)
 }
 
-fn middle(spine: &Spine, board: &Board, element: usize) -> Foot {
-    board.foot_within(spine, element, 0.5 * spine.element_length(element))
+/// The active edges of a flexible element: edges before which its ribs must not cross, in addition to |s| ≤ 2/V. Where the
+/// outline turns inwards ribs pass the end of their own edge and reach an edge farther on, on the −ζ or on the +ζ side; of
+/// several edges in reach the one nearest to a crossing is active. Last comes the inner edge of the element's own arc, which
+/// very steep ribs may pass by.
+pub(crate) fn edges_in_reach(board: &Board, spine: &Spine, element: usize) -> ActiveEdges {
+    let rib = MiddleRib {
+        rib: middle(board, spine, element),
+        convergence: spine.mean_convergence(element),
+        length: spine.element_length(element),
+    };
+    let [minus, plus] = [0, 1].map(|side| rib.nearest_edge(board, side));
+    let mut sides = [0, 1].into_iter();
+    let own = sides.find_map(|side| rib.own_arc(board, side));
+    [minus, plus, own]
+}
+
+fn middle(board: &Board, spine: &Spine, element: usize) -> FlatRib {
+    board.rib_within(spine, element, 0.5 * spine.element_length(element))
 }
 
 /// The rib in the middle of an element, with the s of the element.
 struct MiddleRib {
-    foot: Foot,
+    rib: FlatRib,
     convergence: f64,
     length: f64,
 }
@@ -106,19 +91,19 @@ struct Way {
 impl MiddleRib {
     /// The edge in reach, ahead or behind, at which the rib is nearest to a crossing.
     fn nearest_edge(&self, board: &Board, side: usize) -> Option<Edge> {
-        let [behind, own, ahead] = board.edges_beside(side, &self.foot);
+        let [behind, own, ahead] = board.edges_beside(side, &self.rib);
         let side = sign(side);
         let end = |at: f64| own.first().map_or(0.0, |own| self.direction(own, at));
         let ahead = self.run(ahead.iter(), end(1.0), Way { side, sense: 1.0 });
         let behind = self.run(behind.iter().rev(), end(0.0), Way { side, sense: -1.0 });
-        let slack = |edge: &Edge| edge.slack(self.foot.point.rib_slope, self.convergence);
-        let edges = ahead.into_iter().chain(behind);
+        let slack = |edge: &Edge| edge.slack(self.rib.slope, self.convergence);
+        let edges = ahead.chain(behind);
         edges.min_by(|a, b| slack(a).total_cmp(&slack(b)))
     }
 
     /// The arc beside the foot, if this is its inner side.
     fn own_arc(&self, board: &Board, side: usize) -> Option<Edge> {
-        let [_, own, _] = board.edges_beside(side, &self.foot);
+        let [_, own, _] = board.edges_beside(side, &self.rib);
         let own = own.first()?;
         (sign(side) * own.curve.turn() > 0.0).then(|| self.view(own, sign(side), 0.0))?
     }
@@ -130,30 +115,24 @@ impl MiddleRib {
         edges: impl Iterator<Item = &'a outline::Edge>,
         from: f64,
         way: Way,
-    ) -> Vec<Edge> {
+    ) -> impl Iterator<Item = Edge> {
         let inwards = way.side * way.sense;
         let near = if way.sense > 0.0 { 0.0 } else { 1.0 };
         let nearly = 0.5 * self.length;
-        let mut turned = inwards * from;
-        let mut run = Vec::new();
-        for edge in edges {
+        let (mut turned, mut ends) = (inwards * from, false);
+        let run = edges.map_while(move |edge| {
             let [first, last] = [near, 1.0 - near].map(|at| inwards * self.direction(edge, at));
-            let passes = way.sense * self.foot.excess(&edge.curve.point(near)) > -nearly;
-            if first < turned - STRAIGHT || first >= PI || !passes {
-                break;
-            }
-            run.extend(self.view(edge, way.side, near));
-            if last < first {
-                break;
-            }
-            turned = last;
-        }
-        run
+            let goes_on = !ends && first >= turned - STRAIGHT && first < PI;
+            (turned, ends) = (last, last < first);
+            let passes = || way.sense * self.rib.excess(&edge.curve.point(near)) > -nearly;
+            (goes_on && passes()).then(|| self.view(edge, way.side, near))
+        });
+        run.flatten()
     }
 
     /// Direction of an edge at a fraction of its length, from the direction of the spine at the foot.
     fn direction(&self, edge: &outline::Edge, fraction: f64) -> f64 {
-        edge.direction(fraction) - self.foot.flat.heading
+        edge.direction(fraction) - self.rib.foot.heading
     }
 
     /// The part of an edge that faces the foot; of an arc that turns outwards, its tangent at the near end.
@@ -161,7 +140,7 @@ impl MiddleRib {
         let turn = edge.curve.turn();
         match edge.curve.circle() {
             Some((centre, radius)) if side * turn > 0.0 => {
-                let centre = self.foot.flat.local(&centre);
+                let centre = self.rib.foot.local(&centre);
                 let nearest = (-side * centre.x).atan2(side * centre.y);
                 // Tangents that turn farther have the foot on their other side.
                 let most = (radius / centre.norm()).min(1.0).acos();
@@ -176,7 +155,7 @@ impl MiddleRib {
             }
             _ => {
                 let direction = direction(self.direction(edge, near));
-                let point = self.foot.flat.local(&edge.curve.point(near));
+                let point = self.rib.foot.local(&edge.curve.point(near));
                 let distance = direction.perp(&point);
                 // Along the element the distance grows or falls, and 1 − s v is constant.
                 let farthest = side * distance + 0.5 * self.length * direction.y.abs();
@@ -211,7 +190,9 @@ mod tests {
         for angle in [0.4f64, 1.0, 1.5] {
             let spine = ell(angle);
             let mut seen = 0;
-            for (element, [minus, plus, own]) in edges_in_reach(&spine) {
+            let board = Board::of(&spine);
+            for element in spine.strips() {
+                let [minus, plus, own] = edges_in_reach(&board, &spine, element);
                 assert_eq!((minus, own), (None, None));
                 let Some(edge) = plus else { continue };
                 let ahead = 0.5 - 0.5 * (spine.u[element] + spine.u[element + 1]);
@@ -228,18 +209,19 @@ mod tests {
     #[test]
     fn test_steep_ribs_before_a_corner_cross_although_they_do_not_within_half_the_width() {
         let mut spine = ell(1.0);
-        assert!(crossings(&spine).is_empty());
+        let board = Board::of(&spine);
+        assert_eq!(first_crossing(&board, &spine), None);
         let corner = spine.u.iter().position(|u| *u > 0.4999).unwrap_or(0);
         let beside = corner - 3..corner;
-        for (share, crosses) in [(0.9, true), (0.3, false)] {
+        for (share, expected) in [(0.9, true), (0.3, false)] {
             let s = share * 2.0 / WIDTH;
             for node in beside.start..=corner {
                 spine.rib_slope[node] = -0.2 - s * (spine.u[corner] - spine.u[node]);
             }
-            let found = crossings(&spine);
+            let mut beside = beside.clone();
             assert_eq!(
-                found.iter().any(|element| beside.contains(element)),
-                crosses
+                beside.any(|element| crosses(&board, &spine, element)),
+                expected
             );
         }
     }
@@ -264,9 +246,9 @@ mod tests {
             let board = Board::of(&spine);
             let side = usize::from(!mirror);
             for element in spine.strips() {
-                let mut foot = middle(&spine, &board, element);
-                foot.point.rib_slope += lean;
-                let end = board.ends(&foot)[side];
+                let mut leaning = middle(&board, &spine, element);
+                leaning.slope += lean;
+                let end = board.end(&leaning, side);
                 let v = end.v;
                 let edges = &board.chains.edges[side];
                 let edge = edges[end.place as usize];
@@ -277,8 +259,8 @@ mod tests {
                 if u < 0.2 || u > spine.length() - 0.2 || is_end_line || missed > 1e-6 {
                     continue;
                 }
-                let rib = MiddleRib { foot, convergence: 1.0 / v, length: 0.0 };
-                let slope = rib.foot.point.rib_slope;
+                let rib = MiddleRib { rib: leaning, convergence: 1.0 / v, length: 0.0 };
+                let slope = leaning.slope;
                 let near = [rib.nearest_edge(&board, side), rib.own_arc(&board, side)];
                 let active = near.into_iter().flatten().map(|edge| edge.slack(slope, 1.0 / v));
                 let geodesic = spine.pieces[element].geodesic();

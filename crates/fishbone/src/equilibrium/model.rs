@@ -3,7 +3,7 @@
 use super::{AnySolved, Equilibrium, Solved, Start, intrinsic, refinement, search};
 use crate::geometry::Pose;
 use crate::problem::program::{BeltPoint, BeltProgram};
-use crate::problem::{Mesh, Problem};
+use crate::problem::{Mesh, Problem, Shape};
 use crate::strip::density::Density;
 use crate::strip::developable::DevelopableEnergy;
 use crate::strip::shell::FIELDS;
@@ -114,12 +114,17 @@ pub(crate) trait StripModel<const F: usize, const N: usize>: Density<F> {
         false
     }
 
-    /// The first fault of the active sets of a programme for a shape; `None` where they are right.
-    fn active_set_fault(
+    /// The shape by which the active sets of a programme are judged; `None` where they do not depend on it.
+    fn shape(
         _problem: &Problem,
         _program: &BeltProgram<Self, F, N>,
         _point: &BeltPoint<F>,
-    ) -> Option<String> {
+    ) -> Option<Shape> {
+        None
+    }
+
+    /// The first fault of the active sets of a programme for a shape; `None` where they are right.
+    fn active_set_fault(_program: &BeltProgram<Self, F, N>, _shape: &Shape) -> Option<String> {
         None
     }
 
@@ -282,12 +287,12 @@ impl StripModel<2, 8> for DevelopableEnergy {
         problem.has_active_sets(program)
     }
 
-    fn active_set_fault(
-        problem: &Problem,
-        program: &BeltProgram,
-        point: &BeltPoint,
-    ) -> Option<String> {
-        problem.active_set_fault(program, point)
+    fn shape(problem: &Problem, program: &BeltProgram, point: &BeltPoint) -> Option<Shape> {
+        problem.shape(program, point)
+    }
+
+    fn active_set_fault(program: &BeltProgram, shape: &Shape) -> Option<String> {
+        shape.active_set_fault(program)
     }
 
     fn choose_active_sets(problem: &Problem, program: &mut BeltProgram, point: &BeltPoint) {

@@ -74,10 +74,6 @@ impl Problem {
         point: &BeltPoint<F>,
     ) -> Spine {
         let length = self.units.length;
-        let pose = |pose: &Pose| Pose {
-            frame: pose.frame,
-            position: self.origin + pose.position * length,
-        };
         let piece = |piece: &program::Piece| match piece {
             program::Piece::Strip(element) => Piece::Strip {
                 geodesic: element.geodesic / length,
@@ -86,18 +82,35 @@ impl Problem {
             program::Piece::Joint { angle } => Piece::Joint { angle: *angle },
         };
         let nodes = program.nodes();
-        Spine {
+        let mut spine = Spine {
             width: self.belt.width,
             pieces: program.pieces.iter().map(piece).collect(),
             half_turns: self.belt.half_turns,
             u: nodes.iter().map(|u| u * length).collect(),
-            pose: point.poses.iter().map(pose).collect(),
-            bend: point.fields.iter().map(|f| f[0] / length).collect(),
-            rib_slope: point.fields.iter().map(|f| f[1]).collect(),
+            pose: point.poses.clone(),
+            bend: vec![0.0; nodes.len()],
+            rib_slope: vec![0.0; nodes.len()],
             curved: program
                 .model
                 .curved(&point.fields, length)
                 .map(|fields| self.curved_ribs(fields, &program.pieces)),
+        };
+        self.move_spine(&mut spine, point);
+        spine
+    }
+
+    /// Gives the spine of a developable belt another shape of the same programme.
+    pub(super) fn move_spine<const F: usize>(&self, spine: &mut Spine, point: &BeltPoint<F>) {
+        let length = self.units.length;
+        for (into, pose) in spine.pose.iter_mut().zip(&point.poses) {
+            *into = Pose {
+                frame: pose.frame,
+                position: self.origin + pose.position * length,
+            };
+        }
+        let fields = spine.bend.iter_mut().zip(&mut spine.rib_slope);
+        for ((bend, slope), fields) in fields.zip(&point.fields) {
+            (*bend, *slope) = (fields[0] / length, fields[1]);
         }
     }
 

@@ -23,6 +23,7 @@ use crate::scenario::{Component, EnergyModel, Method, Scenario, SupportSpec};
 use nalgebra::{Matrix3, Vector3};
 use std::sync::Arc;
 
+pub(crate) use active_set::Shape;
 pub(crate) use mesh::Mesh;
 pub use reach::OutOfReach;
 pub(crate) use reach::number;

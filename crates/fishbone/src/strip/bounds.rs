@@ -1,6 +1,6 @@
 //! The inequalities that keep the ribs of an element apart on the board.
 
-use crate::strip::ribs::{Scaled, SlopeJet, Strips, variables};
+use crate::strip::ribs::{Scaled, SlopeJet, Strips, slope_jets};
 use nalgebra::Vector2;
 use num_dual::DualNum;
 
@@ -139,9 +139,9 @@ impl<'a, W: DualNum<Primitive = f64> + Copy> RibBounds<'a, W> {
         let [minus, plus] = if self.strips.geodesic == 0.0 {
             [D::from(-w), D::from(w)]
         } else if self.strips.geodesic > 0.0 {
-            [D::from(-w), self.strips.ends(mean)[1]]
+            [D::from(-w), self.strips.end(mean, 1)]
         } else {
-            [self.strips.ends(mean)[0], D::from(w)]
+            [self.strips.end(mean, 0), D::from(w)]
         };
         let active = |edge: &Option<Edge<W>>| match edge {
             None => D::one(),
@@ -174,13 +174,14 @@ impl RibBounds<'_> {
             let none = SlopeJet::constant(1.0);
             return [plus, minus, none, none, none];
         }
-        self.slacks(variables(slopes)).map(SlopeJet::from)
+        slope_jets(slopes, |slopes| self.slacks(slopes))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::board::feet::Board;
     use crate::board::reach::edges_in_reach;
     use crate::board::samples::{Part, Plan};
     use num_dual::{Dual2SVec64, Dual64, hessian};
@@ -264,8 +265,7 @@ mod tests {
             curvature: 1.0 / 0.2,
             turn: [-0.3, 0.3],
         };
-        let [slope, s] = variables([0.0, 4.0]);
-        let jet = SlopeJet::from(edge.slack(slope, s));
+        let [jet] = slope_jets([0.0, 4.0], |[slope, s]| [edge.slack(slope, s)]);
         assert!((jet.value - 0.8).abs() < 1e-15 && jet.gradient.amax().is_finite());
     }
 
@@ -280,14 +280,15 @@ mod tests {
             let mut spine = Plan::open(0.1, &parts).spine();
             let mut of_width = |width: f64| {
                 spine.width = width;
-                edges_in_reach(&spine)
+                let board = Board::of(&spine);
+                let edges = |element| edges_in_reach(&board, &spine, element);
+                spine.strips().map(edges).collect::<Vec<_>>()
             };
             let [below, at, above] = [-step, 0.0, step].map(|by| of_width(0.1 + 2.0 * by));
             for ((below, at), above) in below.iter().zip(&at).zip(&above) {
-                let wider = moved_out(&at.1, Dual64::from(0.0).derivative());
+                let wider = moved_out(at, Dual64::from(0.0).derivative());
                 for (i, edge) in wider.iter().enumerate() {
-                    let (Some(edge), Some(below), Some(above)) = (edge, below.1[i], above.1[i])
-                    else {
+                    let (Some(edge), Some(below), Some(above)) = (edge, below[i], above[i]) else {
                         continue;
                     };
                     let distance = (above.distance - below.distance) / (2.0 * step);

@@ -3,7 +3,7 @@
 //! A strip is known by the rib slope β and by s = β' + κ_g (1+β²): at v it is `1 − v s` times as wide as on the spine.
 
 use nalgebra::{Matrix2, Vector2};
-use num_dual::{Derivative, Dual2SVec64, DualNum};
+use num_dual::{DualNum, HyperDual64};
 use std::ops::{Div, Mul};
 
 /// Rib convergence, the rate at which neighbouring ribs close in towards +v: s = β' + κ_g (1 + β²).
@@ -107,19 +107,25 @@ impl SlopeJet {
     }
 }
 
-impl From<Dual2SVec64<2>> for SlopeJet {
-    fn from(number: Dual2SVec64<2>) -> Self {
-        Self {
-            value: number.re,
-            gradient: number
-                .v1
-                .unwrap_generic(nalgebra::Const::<1>, nalgebra::Const::<2>)
-                .transpose(),
-            hessian: number
-                .v2
-                .unwrap_generic(nalgebra::Const::<2>, nalgebra::Const::<2>),
+/// Functions of the slopes at both ends of an element, with their derivatives.
+pub(super) fn slope_jets<const K: usize>(
+    slopes: [f64; 2],
+    functions: impl Fn([HyperDual64; 2]) -> [HyperDual64; K],
+) -> [SlopeJet; K] {
+    // Three times numbers that carry one second derivative each take less time than once numbers that carry all.
+    let [first, mixed, second] = [[0, 0], [0, 1], [1, 1]].map(|[i, j]| {
+        let mut slopes = slopes.map(HyperDual64::from);
+        (slopes[i].eps1, slopes[j].eps2) = (1.0, 1.0);
+        functions(slopes)
+    });
+    std::array::from_fn(|k| {
+        let both = mixed[k].eps1eps2;
+        SlopeJet {
+            value: mixed[k].re,
+            gradient: Vector2::new(mixed[k].eps1, mixed[k].eps2),
+            hessian: Matrix2::new(first[k].eps1eps2, both, both, second[k].eps1eps2),
         }
-    }
+    })
 }
 
 /// The strips of one element: of half the width, in-plane curvature κ_g, and length.
@@ -152,6 +158,12 @@ impl<W: DualNum<Primitive = f64> + Copy> Strips<W> {
     /// A rib so steep that it misses the inner edge of its own arc leaves the board farther along; there the root is
     /// continued smoothly.
     pub(crate) fn ends<D: Scaled<W>>(&self, slope: D) -> [D; 2] {
+        [self.end(slope, 0), self.end(slope, 1)]
+    }
+
+    /// The end v₋ or v₊ of the rib of a slope, as [`Self::ends`].
+    #[inline]
+    pub(crate) fn end<D: Scaled<W>>(&self, slope: D, side: usize) -> D {
         let w = self.half_width;
         let tightest = W::from(TIGHTEST) / w;
         let geodesic = match self.geodesic.abs() < tightest.re() {
@@ -159,11 +171,10 @@ impl<W: DualNum<Primitive = f64> + Copy> Strips<W> {
             false => tightest * self.geodesic.signum(),
         };
         let stretch = slope * slope + 1.0;
-        [-w, w].map(|edge| {
-            let offset = edge - geodesic * 0.5 * w * w;
-            let root = continued_root(-stretch * (geodesic * 2.0 * offset) + 1.0);
-            (root + 1.0).recip() * (offset * 2.0)
-        })
+        let edge = [-w, w][side];
+        let offset = edge - geodesic * 0.5 * w * w;
+        let root = continued_root(-stretch * (geodesic * 2.0 * offset) + 1.0);
+        (root + 1.0).recip() * (offset * 2.0)
     }
 
     /// Factors of the width in the density's terms, by slopes at both ends of the element.
@@ -192,16 +203,16 @@ impl Strips {
                 ..Across::PLAIN.map(SlopeJet::constant)
             };
         }
-        self.across(variables(slopes)).map(SlopeJet::from)
+        let [bending, length, area] = slope_jets(slopes, |slopes| {
+            let across = self.across(slopes);
+            [across.bending, across.length, across.area]
+        });
+        Across {
+            bending,
+            length,
+            area,
+        }
     }
-}
-
-/// Two variables as numbers that carry first and second derivatives.
-pub(super) fn variables(at: [f64; 2]) -> [Dual2SVec64<2>; 2] {
-    let [mut first, mut second] = at.map(Dual2SVec64::from);
-    first.v1 = Derivative::derivative_generic(nalgebra::Const::<1>, nalgebra::Const::<2>, 0);
-    second.v1 = Derivative::derivative_generic(nalgebra::Const::<1>, nalgebra::Const::<2>, 1);
-    [first, second]
 }
 
 /// Argument t below which the square root of a rib that all but misses its inner edge is continued, dimensionless.
@@ -263,7 +274,7 @@ fn artanh_ratio_series(y: f64) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use num_dual::hessian;
+    use num_dual::{Dual2SVec64, hessian};
 
     fn strips(geodesic: f64) -> Strips {
         Strips {

@@ -125,7 +125,7 @@ struct Cell {
 impl Cell {
     fn of(spine: &Spine, board: &Board, element: usize, [from, to]: [f64; 2]) -> Self {
         let middle = 0.5 * (from + to);
-        let [minus, plus] = board.ends(&board.foot_within(spine, element, middle));
+        let [minus, plus] = board.ends(&board.rib_within(spine, element, middle));
         let s = spine.convergence(element, spine.fields(element, middle).1);
         let [a, b] = [minus.v, plus.v].map(|v| (1.0 - v * s).max(0.0));
         let [c, d] = [from, to].map(|distance| {
@@ -320,11 +320,11 @@ mod tests {
             on_board += 1.0;
             let foot = board.foot_at(spine, u);
             let element = spine.u.partition_point(|&node| node < u).max(1) - 1;
-            let is_on_rib = foot.excess(&point).abs() < 1e-6 * spine.width;
+            let is_on_rib = foot.rib.excess(&point).abs() < 1e-6 * spine.width;
             if matches!(spine.pieces[element], Piece::Strip { .. }) && is_on_rib {
                 let s = spine.convergence(element, foot.point.rib_slope);
                 let bend = curvature(foot.point.bend, foot.point.rib_slope);
-                let v = foot.flat.local(&point).y;
+                let v = foot.rib.foot.local(&point).y;
                 below += f64::from(u8::from(bend_radius(bend, s, v) < radius));
             }
         }

@@ -279,7 +279,7 @@ fn tightest_near(spine: &Spine, board: &Board, part: Part, best: Extreme) -> Ext
 fn tightest_on_rib(spine: &Spine, board: &Board, element: usize, distance: f64) -> Extreme {
     let (bend, slope) = spine.fields(element, distance);
     let s = spine.convergence(element, slope);
-    let [minus, plus] = board.ends(&board.foot_within(spine, element, distance));
+    let [minus, plus] = board.ends(&board.rib_within(spine, element, distance));
     let v = if s > 0.0 {
         plus.v
     } else if s < 0.0 {
@@ -534,7 +534,7 @@ mod tests {
                 for i in 0..=100 {
                     let (bend, slope) = spine.fields(element, h * f64::from(i) / 100.0);
                     let u = spine.u[element] + h * f64::from(i) / 100.0;
-                    let [a, b] = board.ends(&board.foot_at(&spine, u)).map(|end| end.v);
+                    let [a, b] = board.ends(&board.foot_at(&spine, u).rib).map(|end| end.v);
                     for j in 0..=4 {
                         let v = a + (b - a) * f64::from(j) / 4.0;
                         let s = spine.convergence(element, slope);

@@ -1,7 +1,7 @@
 //! The rib or the plane of the surface to which a flat point belongs.
 
 use super::patch::Polygon;
-use crate::board::feet::{Board, Foot};
+use crate::board::feet::{Board, FlatRib, Foot};
 use crate::strip::spine::Spine;
 use nalgebra::Vector2;
 
@@ -37,7 +37,7 @@ fn foot_of(spine: &Spine, board: &Board, point: &Vector2<f64>) -> Option<Foot> {
 fn on_element(spine: &Spine, board: &Board, element: usize, point: &Vector2<f64>) -> Option<Foot> {
     let distance = board.distance_to(spine, element, point)?;
     let foot = board.foot_within(spine, element, distance);
-    board.is_on_rib(&foot, point).then_some(foot)
+    board.is_on_rib(&foot.rib, point).then_some(foot)
 }
 
 fn on_plate(spine: &Spine, board: &Board, point: &Vector2<f64>) -> Option<Foot> {
@@ -52,7 +52,7 @@ fn on_plate(spine: &Spine, board: &Board, point: &Vector2<f64>) -> Option<Foot> 
 fn beyond_end(spine: &Spine, board: &Board, point: &Vector2<f64>) -> Option<Foot> {
     [0, spine.u.len() - 1].into_iter().find_map(|node| {
         let foot = board.foot_at_node(spine, node);
-        let inside = |&side: &usize| is_beyond(board, &foot, node == 0, side, point);
+        let inside = |&side: &usize| is_beyond(board, &foot.rib, node == 0, side, point);
         (0..2)
             .any(|side| board.chains.is_open && inside(&side))
             .then_some(foot)
@@ -61,17 +61,17 @@ fn beyond_end(spine: &Spine, board: &Board, point: &Vector2<f64>) -> Option<Foot
 
 fn is_beyond(
     board: &Board,
-    foot: &Foot,
+    rib: &FlatRib,
     at_start: bool,
     side: usize,
     point: &Vector2<f64>,
 ) -> bool {
     let margin = board.tolerance();
     let sign = if at_start { 1.0 } else { -1.0 };
-    let local = foot.flat.local(point);
+    let local = rib.foot.local(point);
     let on_side = local.y * (side as f64 - 0.5) >= -margin;
     let before_line = sign * local.x >= -margin;
-    let behind_rib = sign * foot.excess(point) >= -margin;
-    let depth = || board.depth(foot, side, point);
+    let behind_rib = sign * rib.excess(point) >= -margin;
+    let depth = || board.depth(rib, side, point);
     on_side && before_line && behind_rib && depth().is_some_and(|depth| depth >= -margin)
 }

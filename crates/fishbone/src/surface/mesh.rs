@@ -99,7 +99,7 @@ impl<'a> Builder<'a> {
     fn rows(&mut self, n: usize) -> Vec<Row> {
         let mut rows: Vec<Row> = Vec::new();
         for (foot, closes_plate) in self.feet() {
-            let ends = self.board.ends(&foot);
+            let ends = self.board.ends(&foot.rib);
             let shared = rows
                 .last()
                 .map_or([None; 2], |before| self.shared_ends(before, &ends));
@@ -225,7 +225,7 @@ impl<'a> Builder<'a> {
 
     /// A vertex in the tangent plane at a foot.
     fn flat_vertex(&mut self, foot: &Foot, flat: Vector2<f64>) -> u32 {
-        let local = foot.flat.local(&flat);
+        let local = foot.rib.foot.local(&flat);
         let point = Vector3::new(0.0, local.x, local.y);
         self.vertex(foot.point.pose.transform(&point), flat)
     }

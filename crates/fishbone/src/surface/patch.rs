@@ -14,7 +14,7 @@ const FINE: f64 = 1e-3;
 impl Polygon {
     /// The outline of a bent stiffener, from its first rib to its last.
     pub(super) fn of_plate(spine: &Spine, board: &Board, plate: &[usize; 2]) -> Self {
-        let [first, last] = plate.map(|node| board.ends(&board.foot_at_node(spine, node)));
+        let [first, last] = plate.map(|node| board.ends(&board.rib_at_node(spine, node)));
         let step = FINE * board.half_width;
         let edge = |side: usize| {
             let between = edge_points(board, side, [first[side].place, last[side].place], step);

@@ -78,14 +78,14 @@ impl Rib {
     pub fn at(spine: &Spine, u: f64) -> Self {
         let board = Board::of(spine);
         let foot = board.foot_at(spine, u);
-        Self::new(&foot, &board.ends(&foot))
+        Self::new(&foot, &board.ends(&foot.rib))
     }
 
     pub(super) fn new(foot: &Foot, [minus, plus]: &[End; 2]) -> Self {
         Self {
             u: foot.point.u,
             pose: foot.point.pose,
-            flat: foot.flat,
+            flat: foot.rib.foot,
             slope: foot.point.rib_slope,
             v_minus: minus.v,
             v_plus: plus.v,
@@ -130,7 +130,7 @@ pub fn ribs(spine: &Spine) -> Vec<Rib> {
     let board = Board::of(spine);
     let rib = |node: usize| {
         let foot = board.foot_at_node(spine, node);
-        Rib::new(&foot, &board.ends(&foot))
+        Rib::new(&foot, &board.ends(&foot.rib))
     };
     (0..spine.u.len()).map(rib).collect()
 }
@@ -176,7 +176,7 @@ pub fn points(spine: &Spine, n_across: usize) -> Vec<Vec<Vector3<f64>>> {
 /// If the spine has no nodes.
 pub fn material_point(spine: &Spine, y: f64, z: f64) -> Option<Vector3<f64>> {
     let place = locate(spine, &Vector2::new(y, z))?;
-    let local = place.foot.flat.local(&place.point);
+    let local = place.foot.rib.foot.local(&place.point);
     let foot = &place.foot.point;
     let Some(curve) = &foot.curve else {
         return Some(foot.pose.transform(&Vector3::new(0.0, local.x, local.y)));

@@ -22,7 +22,7 @@ pub(super) fn is_admissible(spine: &Spine) -> bool {
     let strip = |element: &usize| matches!(spine.pieces[*element], Piece::Strip { .. });
     (0..spine.elements()).filter(strip).all(|element| {
         let [before, after] =
-            [element, element + 1].map(|node| board.ends(&board.foot_at_node(spine, node)));
+            [element, element + 1].map(|node| board.ends(&board.rib_at_node(spine, node)));
         (0..2).all(|side| {
             let gap = (after[side].flat - before[side].flat).norm();
             after[side].place > before[side].place && gap > 0.05 * spine.element_length(element)
@@ -220,7 +220,7 @@ proptest! {
         prop_assume!(is_admissible(&spine));
         let flat = Board::of(&spine);
         for node in 0..spine.u.len() {
-            for end in flat.ends(&flat.foot_at_node(&spine, node)) {
+            for end in flat.ends(&flat.rib_at_node(&spine, node)) {
                 prop_assert!(distance_to_outline(&spine, &end.flat) < 1e-9 * WIDTH);
             }
         }

@@ -4,7 +4,7 @@ use super::TooConcave;
 use super::chain::{Chain, Factor, NodeVector};
 use super::pair_matrix::Square;
 use crate::linearisation::product;
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use nalgebra::{DMatrix, SymmetricEigen};
 
 /// One row of the border: a constraint, or a square in the second derivative of a constraint.
 ///
@@ -65,17 +65,46 @@ pub(super) struct Border<const N: usize> {
     pub(super) rows: Vec<Row<N>>,
     /// Step of the chain under a unit multiplier of every row.
     answers: Vec<Vec<NodeVector<N>>>,
+    /// Change of every row under a unit multiplier of every row, by chain and rows.
+    compliance: DMatrix<f64>,
     inverse: DMatrix<f64>,
+    /// Factor that scales the compliance of every row to order one.
+    scale: Vec<f64>,
+    /// Change of every row that a correction makes.
+    left: Vec<f64>,
+    /// Multipliers of the rows in the last correction.
+    multipliers: Vec<f64>,
     gradient: Vec<NodeVector<N>>,
 }
 
 impl<const N: usize> Border<N> {
     pub(super) fn new(rows: Vec<Row<N>>, nodes: usize) -> Self {
-        Self {
-            answers: vec![vec![NodeVector::zeros(); nodes]; rows.len()],
-            inverse: DMatrix::zeros(rows.len(), rows.len()),
-            gradient: vec![NodeVector::zeros(); nodes],
+        let mut border = Self {
             rows,
+            answers: Vec::new(),
+            compliance: DMatrix::zeros(0, 0),
+            inverse: DMatrix::zeros(0, 0),
+            scale: Vec::new(),
+            left: Vec::new(),
+            multipliers: Vec::new(),
+            gradient: vec![NodeVector::zeros(); nodes],
+        };
+        border.make_room();
+        border
+    }
+
+    /// Makes room for the rows; allocates only where their number changes.
+    fn make_room(&mut self) {
+        let count = self.rows.len();
+        if self.scale.len() != count {
+            let nodes = self.gradient.len();
+            let answer = || vec![NodeVector::zeros(); nodes];
+            self.answers.resize_with(count, answer);
+            self.compliance = DMatrix::zeros(count, count);
+            self.inverse = DMatrix::zeros(count, count);
+            for numbers in [&mut self.scale, &mut self.left, &mut self.multipliers] {
+                numbers.resize(count, 0.0);
+            }
         }
     }
 
@@ -83,8 +112,7 @@ impl<const N: usize> Border<N> {
     pub(super) fn replace_beyond(&mut self, kept: usize, rows: impl Iterator<Item = Row<N>>) {
         self.rows.truncate(kept);
         self.rows.extend(rows);
-        let answer = || vec![NodeVector::zeros(); self.gradient.len()];
-        self.answers.resize_with(self.rows.len(), answer);
+        self.make_room();
     }
 
     /// The number of concave rows, which have a negative compliance.
@@ -107,39 +135,52 @@ impl<const N: usize> Border<N> {
         factor: &mut Factor<U, N>,
         softness: f64,
     ) -> Result<usize, TooConcave> {
-        /// Eigenvalue of the scaled compliance below which a row depends on others; dimensionless.
-        const ROUNDING: f64 = 1e-14;
         if self.rows.is_empty() {
             return Ok(0);
         }
-        let compliance = self.compliance(chain, factor, softness);
+        self.find_compliance(chain, factor, softness);
         // Rows may have any units: each is scaled to a compliance of order one.
-        let scale = DVector::from_fn(self.rows.len(), |row, _| match compliance.row(row).amax() {
-            0.0 => 0.0,
-            largest => largest.sqrt().recip(),
-        });
-        let scaled = compliance.component_mul(&(&scale * scale.transpose()));
-        if scaled.iter().any(|entry| !entry.is_finite()) {
+        for (scale, row) in self.scale.iter_mut().zip(self.compliance.row_iter()) {
+            *scale = match row.amax() {
+                0.0 => 0.0,
+                largest => largest.sqrt().recip(),
+            };
+        }
+        scale_both_sides(&mut self.compliance, &self.scale);
+        if self.compliance.iter().any(|entry| !entry.is_finite()) {
             return Err(TooConcave);
         }
-        let eigen = SymmetricEigen::new(scaled);
-        let counts = |value: f64| value.abs() > ROUNDING;
-        let inverse = |value: f64| if counts(value) { value.recip() } else { 0.0 };
-        let inverse = &eigen.eigenvectors
-            * DMatrix::from_diagonal(&eigen.eigenvalues.map(inverse))
-            * eigen.eigenvectors.transpose();
-        self.inverse = inverse.component_mul(&(&scale * scale.transpose()));
-        let negative = |value: &&f64| counts(**value) && **value < 0.0;
-        Ok(eigen.eigenvalues.iter().filter(negative).count())
+        self.inverse.copy_from(&self.compliance);
+        let negative = match invert_positive(&mut self.inverse) {
+            true => 0,
+            false => {
+                let negative;
+                (self.inverse, negative) = invert_any(self.compliance.clone());
+                negative
+            }
+        };
+        scale_both_sides(&mut self.inverse, &self.scale);
+        Ok(negative)
     }
 
-    /// Compliance matrix: change of every row under a unit multiplier of every row, by chain and rows.
+    /// The compliance matrix: change of every row under a unit multiplier of every row, by chain and rows.
     pub(super) fn compliance<const U: usize>(
-        &mut self,
+        mut self,
         chain: &Chain<U, N>,
         factor: &mut Factor<U, N>,
         softness: f64,
     ) -> DMatrix<f64> {
+        self.make_room();
+        self.find_compliance(chain, factor, softness);
+        self.compliance
+    }
+
+    fn find_compliance<const U: usize>(
+        &mut self,
+        chain: &Chain<U, N>,
+        factor: &mut Factor<U, N>,
+        softness: f64,
+    ) {
         for (row, answer) in self.rows.iter().zip(&mut self.answers) {
             self.gradient.fill(NodeVector::zeros());
             for (node, by) in row.nodes.iter().zip(&row.by) {
@@ -147,34 +188,115 @@ impl<const N: usize> Border<N> {
             }
             chain.solve(factor, &self.gradient, answer);
         }
-        let count = self.rows.len();
-        let compliance = DMatrix::from_fn(count, count, |i, j| {
-            let row = &self.rows[i];
-            let own = match (i == j, row.is_equality) {
-                (true, true) => softness + row.compliance,
-                (true, false) => row.compliance,
-                _ => 0.0,
-            };
-            own - row.change(&self.answers[j])
-        });
-        0.5 * (&compliance + compliance.transpose())
+        for (i, row) in self.rows.iter().enumerate() {
+            for (j, other) in self.rows[..=i].iter().enumerate() {
+                let [change, back] = [row.change(&self.answers[j]), other.change(&self.answers[i])];
+                let both = -0.5 * (change + back);
+                (self.compliance[(i, j)], self.compliance[(j, i)]) = (both, both);
+            }
+            let softness = if row.is_equality { softness } else { 0.0 };
+            self.compliance[(i, i)] += softness + row.compliance;
+        }
     }
 
     /// Corrects a step of the chain so that every row changes by `−missing`; gives the multipliers of the rows.
-    pub(super) fn correct(&self, missing: &[f64], step: &mut [NodeVector<N>]) -> DVector<f64> {
+    pub(super) fn correct(&mut self, missing: &[f64], step: &mut [NodeVector<N>]) -> &[f64] {
         let rows = self.rows.iter().zip(missing);
-        let left = rows.map(|(row, missing)| row.change(step) + missing);
-        let multipliers = &self.inverse * DVector::from_iterator(self.rows.len(), left);
-        for (answer, multiplier) in self.answers.iter().zip(&multipliers) {
+        for (left, (row, missing)) in self.left.iter_mut().zip(rows) {
+            *left = row.change(step) + missing;
+        }
+        for (multiplier, row) in self.multipliers.iter_mut().zip(self.inverse.row_iter()) {
+            let terms = row.iter().zip(&self.left);
+            *multiplier = terms.map(|(entry, left)| entry * left).sum();
+        }
+        for (answer, multiplier) in self.answers.iter().zip(&self.multipliers) {
             for (node, change) in step.iter_mut().zip(answer) {
                 *node += *multiplier * change;
             }
         }
-        multipliers
+        &self.multipliers
     }
 
     /// Change of every row along a step.
     pub(super) fn changes(&self, step: &[NodeVector<N>]) -> impl Iterator<Item = f64> {
         self.rows.iter().map(|row| row.change(step))
+    }
+}
+
+/// Multiplies every entry of a matrix by the factors of its row and of its column.
+fn scale_both_sides(matrix: &mut DMatrix<f64>, scale: &[f64]) {
+    for (mut column, by_column) in matrix.column_iter_mut().zip(scale) {
+        for (entry, by_row) in column.iter_mut().zip(scale) {
+            *entry *= by_row * by_column;
+        }
+    }
+}
+
+/// Inverts a matrix in its place by exchange of one unknown after the other for its equation's right-hand side; false, and the
+/// matrix lost, where it is not clearly positive.
+fn invert_positive(matrix: &mut DMatrix<f64>) -> bool {
+    /// Least pivot of a scaled matrix that is clearly positive, dimensionless.
+    const LEAST: f64 = 1e-12;
+    for k in 0..matrix.nrows() {
+        let pivot = matrix[(k, k)];
+        // The comparison is false for a NaN.
+        let is_positive = pivot > LEAST;
+        if !is_positive {
+            return false;
+        }
+        for j in (0..matrix.ncols()).filter(|j| *j != k) {
+            let by = matrix[(k, j)] / pivot;
+            for i in (0..matrix.nrows()).filter(|i| *i != k) {
+                matrix[(i, j)] -= by * matrix[(i, k)];
+            }
+            matrix[(k, j)] = by;
+        }
+        for i in (0..matrix.nrows()).filter(|i| *i != k) {
+            matrix[(i, k)] /= -pivot;
+        }
+        matrix[(k, k)] = pivot.recip();
+    }
+    true
+}
+
+/// Inverse of a scaled symmetric matrix by its eigenvectors, zero along those of eigenvalue zero, and its number of negative
+/// eigenvalues.
+fn invert_any(matrix: DMatrix<f64>) -> (DMatrix<f64>, usize) {
+    /// Eigenvalue below which a row depends on others; dimensionless.
+    const ROUNDING: f64 = 1e-14;
+    let eigen = SymmetricEigen::new(matrix);
+    let counts = |value: f64| value.abs() > ROUNDING;
+    let inverse = |value: f64| if counts(value) { value.recip() } else { 0.0 };
+    let inverse = &eigen.eigenvectors
+        * DMatrix::from_diagonal(&eigen.eigenvalues.map(inverse))
+        * eigen.eigenvectors.transpose();
+    let negative = |value: &&f64| counts(**value) && **value < 0.0;
+    (inverse, eigen.eigenvalues.iter().filter(negative).count())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn test_inverse_of_a_positive_matrix_is_that_by_its_eigenvectors() {
+        let root = DMatrix::from_fn(5, 5, |i, j| 1.0 / (1.0 + (i * i + 3 * j) as f64));
+        let positive = DMatrix::identity(5, 5) + &root * root.transpose();
+        let mut inverse = positive.clone();
+        assert!(invert_positive(&mut inverse));
+        let (by_eigenvectors, negative) = invert_any(positive.clone());
+        assert_eq!(negative, 0);
+        assert!((&inverse - by_eigenvectors).amax() < 1e-14);
+        assert!((inverse * positive - DMatrix::identity(5, 5)).amax() < 1e-14);
+    }
+
+    #[test]
+    fn test_redundant_and_concave_rows_are_not_positive() {
+        let redundant = DMatrix::from_element(2, 2, 1.0);
+        let concave = DMatrix::from_row_slice(2, 2, &[1.0, 2.0, 2.0, 1.0]);
+        for (matrix, negative) in [(redundant, 0), (concave, 1)] {
+            assert!(!invert_positive(&mut matrix.clone()));
+            assert_eq!(invert_any(matrix).1, negative);
+        }
     }
 }

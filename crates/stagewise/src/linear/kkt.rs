@@ -61,6 +61,8 @@ pub(crate) struct Kkt<const X: usize, const U: usize, const N: usize> {
     correction: Vec<NodeVector<N>>,
     /// Multipliers along the step of the rows of pairs that are not equalities.
     pair_forces: Vec<f64>,
+    /// Residual of the rows of pairs.
+    missing: Vec<f64>,
     /// Right-hand side of the inequalities between pairs: the third row of the system is `S step − s/ν κ = −pair_targets`.
     pub(crate) pair_targets: Vec<f64>,
     rates: Vec<f64>,
@@ -97,6 +99,7 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
             correction: zeros.clone(),
             pair_forces: vec![0.0; linear.pair_slacks.len()],
             pair_targets: vec![0.0; linear.pair_slacks.len()],
+            missing: Vec::new(),
             rates: vec![0.0; layout.equalities()],
             multiplier_step: vec![0.0; layout.equalities()],
             step: zeros,
@@ -378,8 +381,8 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
     ///
     /// Gives the largest residual that is left of the equalities at nodes.
     pub(crate) fn find_step(&mut self, gradient: &[NodeVector<N>], targets: &[f64]) -> f64 {
-        if let Some(border) = self.exact.take() {
-            let left = self.find_step_exactly(&border, gradient, targets);
+        if let Some(mut border) = self.exact.take() {
+            let left = self.find_step_exactly(&mut border, gradient, targets);
             self.exact = Some(border);
             return left;
         }
@@ -480,11 +483,12 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         if self.border.rows.is_empty() {
             return;
         }
-        let mut missing: Vec<f64> = match step {
-            Some(step) => self.border.changes(step).collect(),
-            None => vec![0.0; self.border.rows.len()],
-        };
-        let (equalities, inequalities) = missing.split_at_mut(targets.len());
+        self.missing.clear();
+        match step {
+            Some(step) => self.missing.extend(self.border.changes(step)),
+            None => self.missing.resize(self.border.rows.len(), 0.0),
+        }
+        let (equalities, inequalities) = self.missing.split_at_mut(targets.len());
         for (missing, target) in equalities.iter_mut().zip(targets) {
             *missing += target;
         }
@@ -495,8 +499,8 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         for ((missing, row), force) in inequalities.iter_mut().zip(rows).zip(&self.pair_forces) {
             *missing -= row.compliance * force;
         }
-        let forces = self.border.correct(&missing, &mut self.correction);
-        let (equalities, inequalities) = forces.as_slice().split_at(targets.len());
+        let forces = self.border.correct(&self.missing, &mut self.correction);
+        let (equalities, inequalities) = forces.split_at(targets.len());
         let at_nodes = self.linear.layout().equalities_at_nodes();
         for (step, force) in self.multiplier_step[at_nodes..].iter_mut().zip(equalities) {
             *step += force;
@@ -509,7 +513,7 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
     /// Finds the step where all equalities are rows of a border.
     fn find_step_exactly(
         &mut self,
-        border: &Border<N>,
+        border: &mut Border<N>,
         gradient: &[NodeVector<N>],
         targets: &[f64],
     ) -> f64 {
@@ -523,7 +527,7 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
         all.extend(&self.pair_targets);
         all.resize(border.rows.len(), 0.0);
         let forces = border.correct(&all, &mut self.step);
-        let (equalities, others) = forces.as_slice().split_at(targets.len());
+        let (equalities, others) = forces.split_at(targets.len());
         self.multiplier_step.copy_from_slice(equalities);
         self.pair_forces.copy_from_slice(others);
         for _ in 0..REFINEMENTS {
@@ -543,7 +547,7 @@ impl<const X: usize, const U: usize, const N: usize> Kkt<X, U, N> {
                 .collect();
             let forces = border.correct(&missing, &mut self.correction);
             let steps = self.multiplier_step.iter_mut().chain(&mut self.pair_forces);
-            steps.zip(&forces).for_each(|(step, force)| *step += force);
+            steps.zip(forces).for_each(|(step, force)| *step += force);
             for (step, correction) in self.step.iter_mut().zip(&self.correction) {
                 *step += correction;
             }

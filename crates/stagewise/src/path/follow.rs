@@ -23,7 +23,8 @@ pub struct Followed {
     pub reached: f64,
 }
 
-/// A minimum with the work arrays to follow it: only programmes with constraints between pairs allocate on the way.
+/// A minimum with the work arrays to follow it. Nothing is allocated on the way but where constraints between pairs have second
+/// derivatives, or hold directions along which the rest of the programme is concave.
 #[derive(Clone)]
 pub struct Follower<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> {
     iterate: PrimalDual<P, X, U, N>,

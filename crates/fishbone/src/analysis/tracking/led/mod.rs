@@ -12,7 +12,7 @@ use crate::equilibrium::model::StripModel;
 use crate::equilibrium::{Equilibrium, Flat, Solved, Status, largest_change};
 use crate::geometry::{Pose, Wrench, exp};
 use crate::problem::program::{BeltPoint, BeltProgram};
-use crate::problem::{Problem, Units};
+use crate::problem::{Problem, Shape, Units};
 use crate::scenario::error::ScenarioError;
 use crate::scenario::{Scenario, SegmentSpec, SupportSpec};
 use nalgebra::{SVector, Vector3};
@@ -38,6 +38,8 @@ pub(super) struct Led<D: StripModel<F, N>, const F: usize, const N: usize> {
     sound: Vec<SVector<f64, F>>,
     /// The board as it lies flat and at rest.
     flat: Option<Flat>,
+    /// Room for the shape by which the active sets are judged; `None` where they do not depend on it.
+    shape: Option<Shape>,
     /// Difference between the scenario's potential and the programme's, for their origins.
     potential_of_origin: f64,
     /// Room for the way of an update.
@@ -75,6 +77,7 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
             watched: largest_change(program, point),
             sound: Vec::new(),
             flat: Flat::of(&solved.program),
+            shape: D::shape(&problem, &solved.program, point),
             potential_of_origin: equilibrium.energy - stored * units.energy,
             problem,
             follower,
@@ -278,9 +281,12 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
             .any(|from| (0..supports.len()).any(|to| to != *from && is_nearly_straight(*from, to)))
     }
 
-    fn is_settled(&self) -> bool {
-        let (program, point) = (self.follower.program(), self.follower.point());
-        D::active_set_fault(&self.problem, program, point).is_none()
+    fn is_settled(&mut self) -> bool {
+        let Some(shape) = &mut self.shape else {
+            return true;
+        };
+        shape.move_to(&self.problem, self.follower.point());
+        D::active_set_fault(self.follower.program(), shape).is_none()
     }
 
     /// Returns to the minimum of the last departure.

@@ -62,10 +62,12 @@ where
             Vec<SVector<f64, F>>,
             Option<Flat>,
         > = Deserialize::deserialize(deserializer)?;
+        let shape = D::shape(&stored.problem, &stored.program, &stored.at.point);
         let follower = Self::follower(&stored.problem, stored.program, &stored.at);
         let mut follower = follower.map_err(R::Error::custom)?;
         follower.set_next_stride(stored.next_stride);
         Ok(Self {
+            shape,
             follower,
             is_graded_anew: D::is_graded_anew(&stored.problem),
             problem: stored.problem,
