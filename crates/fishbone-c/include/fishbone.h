@@ -316,8 +316,8 @@ enum FishboneStatus fishbone_tracker_copy(const struct FishboneTracker *tracker,
  * Goals that the belt does not reach are no failure of the call: the status of the update has the outcome, and the tracker
  * stays at the last equilibrium on the way. A pose that no scenario may hold, such as one that is not finite, is refused.
  *
- * From the second update on nothing is allocated where the equilibrium is followed on its mesh and the board has neither
- * links nor bends. Beyond: the mesh changes, and with it the number of nodes, where the error of the shape asks for it,
+ * From the second update on nothing is allocated where the equilibrium is followed on its mesh and its ribs keep to the
+ * edges of the board that bound them. Beyond: the mesh changes, and with it the number of nodes, where the error of the shape asks for it,
  * unless solver.elements of the scenario fixes the mesh; that of a slender belt is graded anew at every update.
  */
 enum FishboneStatus fishbone_tracker_update(struct FishboneTracker *tracker,
