@@ -45,11 +45,11 @@ def test_the_part_that_is_still_held_keeps_its_shape_in_random_regrasps(seed):
 @pytest.mark.parametrize("energy", ["fishbone", "wunderlich"])
 def test_a_hold_alone_changes_no_energy_and_bears_no_load(energy):
     tracker = example1(energy)
-    energy, nodes, end = tracker.energy, len(tracker.u), tracker.reaction("end")
+    energy, nodes, end = tracker.energy, len(np.unique(tracker.u)), tracker.reaction("end")
     update = tracker.regrasp(hold=0.44)
     assert update.status == "converged"
     assert update.jump < 1e-3
-    assert (places(tracker), len(tracker.u)) == (["start", 0.44, "end"], nodes)
+    assert (places(tracker), len(np.unique(tracker.u))) == (["start", 0.44, "end"], nodes)
     assert tracker.energy == pytest.approx(energy, rel=2e-3)
     np.testing.assert_allclose(tracker.reaction("end").force, end.force, rtol=0.03, atol=0.3)
     assert np.linalg.norm(tracker.reaction(0.44).force) < 0.05 * np.linalg.norm(end.force)
@@ -71,12 +71,15 @@ def test_the_start_is_let_go_and_the_end_carries_the_belt():
 
 def test_a_belt_is_handed_over_from_hold_to_hold():
     tracker = example1()
+    energies = [tracker.energy]
     for hold, release in [(0.6, "end"), (0.8, 0.6), ("end", 0.8)]:
         assert tracker.regrasp(hold=hold, release=release).status == "converged"
+        energies.append(tracker.energy)
     assert places(tracker)[1] in {"end", 1.0}
-    assert tracker.energy < 1e-3
-    assert tracker.update(tracker.position[-1] + [0.0, -0.05, 0.05]).status == "converged"
-    assert tracker.energy > 0.1
+    assert energies == sorted(energies, reverse=True)
+    end = tracker.position[-1] + np.array([0.0, -0.05, 0.05])
+    assert tracker.update(end).status == "converged"
+    np.testing.assert_allclose(tracker.position[-1], end, atol=1e-8)
 
 
 def test_a_regrasp_on_a_state_and_a_copy_is_the_same():

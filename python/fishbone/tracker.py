@@ -277,6 +277,34 @@ class Tracker:
         force, moment = self._inner.reaction(self._index_of(support))
         return Reaction(np.array(force), np.array(moment))
 
+    def jacobian(self, support: Place | None = None, v: float = 0.0) -> Floats:
+        """Derivatives of positions by the motion of a support, by default of the first that moves.
+
+        They are of the points of the board at v across on the ribs of the nodes: of the spine, of an edge at half the
+        width. The last axis is [translation, left world-axes rotation about the support point]; for components that
+        the support leaves free the derivatives are 0. No Newton step is taken.
+
+        Shapes: (n, 3, 6).
+        Units: `v` in those of the scenario.
+        Errors: `NoSupport`; `NoSensitivity` where the belt is taut or a part of it has stayed flat under load;
+        `InvalidArgument` of points off the spine with the energy "shell".
+        """
+        return self._inner.derivatives(self._index_or_first(support), float(numbers_of("v", v, ())))[0]
+
+    def stiffness(self, support: Place | None = None) -> Floats:
+        """Derivatives of a support's reaction by its motion, by default of the first that moves.
+
+        Rows are [force, moment], columns [translation, left world-axes rotation about the support point]. The moment is
+        about the point that moves, so that the matrix is not symmetric where the support bears a load.
+
+        Shapes: (6, 6).
+        Errors: as `jacobian`.
+        """
+        return self._inner.derivatives(self._index_or_first(support), 0.0)[1]
+
+    def _index_or_first(self, support: Place | None) -> int:
+        return self._inner.moving[0] if support is None else self._index_of(support)
+
     def surface(self, n_across: int = 9) -> Floats:
         """Points of the surface, as `Equilibrium.surface`; `Equilibrium.surface_triangles` has its triangles.
 

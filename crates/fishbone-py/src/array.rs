@@ -1,6 +1,6 @@
 //! NumPy arrays of the core's vectors: float64, C order, one row a node.
 
-use nalgebra::{Matrix3, Matrix3x6, Vector2, Vector3};
+use nalgebra::{Matrix3, Matrix3x6, Matrix6, Vector2, Vector3};
 use numpy::ndarray::{Array2, Array3};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3};
 use pyo3::exceptions::PyRuntimeError;
@@ -59,6 +59,15 @@ pub(crate) fn rows<'a, 'py>(
     let array = Array2::from_shape_vec(shape, flat)
         .map_err(|error| PyRuntimeError::new_err(error.to_string()))?;
     Ok(array.into_pyarray(py))
+}
+
+/// Shapes: (6, 6).
+pub(crate) fn square<'py>(py: Python<'py>, matrix: &Matrix6<f64>) -> Points<'py> {
+    let rows: Vec<[f64; 6]> = matrix
+        .row_iter()
+        .map(|row| row.transpose().into())
+        .collect();
+    Array2::from(rows).into_pyarray(py)
 }
 
 /// Shapes: (n, 2, 2).

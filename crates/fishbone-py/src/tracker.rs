@@ -2,6 +2,7 @@
 
 use crate::array::{self, Grid, Points, Scalars};
 use crate::equilibrium::Equilibrium;
+use crate::errors::exception::InvalidArgument;
 use crate::errors::{invalid_scenario, raised};
 use crate::exclusive::Exclusive;
 use crate::scenario::Scenario;
@@ -255,6 +256,35 @@ impl Tracker {
         })?;
         let update = update.map_err(|refused| invalid_scenario(py, &refused, None))?;
         Ok(updated(update, None))
+    }
+
+    /// Derivatives by the motion of a support, of the points at v across on the ribs of the nodes, and of its reaction.
+    ///
+    /// Shapes: (n, 3, 6), (6, 6).
+    /// Errors: `NoSensitivity`; `InvalidArgument` of points off the spine of a strip of finite thickness; as `equilibrium`.
+    fn derivatives<'py>(
+        &self,
+        py: Python<'py>,
+        support: usize,
+        across: f64,
+    ) -> PyResult<(Grid<'py>, Points<'py>)> {
+        let (found, ribs) = self.moving.with(py, |tracker, _| {
+            (tracker.derivatives(support), tracker.ribs())
+        })?;
+        let found = found.map_err(|error| raised(py, &error))?;
+        let points = match ribs {
+            _ if across == 0.0 => found.position,
+            Some(ribs) => found.at(&ribs.iter().map(|rib| across * rib).collect::<Vec<_>>()),
+            None => {
+                return Err(InvalidArgument::new_err(format!(
+                    "v: found {across} with energy = \"shell\", allowed 0: its ribs are not straight"
+                )));
+            }
+        };
+        Ok((
+            array::matrices(py, &points),
+            array::square(py, &found.reaction),
+        ))
     }
 
     /// The present scenario and its equilibrium.

@@ -16,7 +16,7 @@ use crate::names::named;
 use crate::strip::developable::DevelopableEnergy;
 use crate::strip::shell::{FIELDS, Shell};
 use linearised::Linearised;
-pub(super) use motion::add_support_motion;
+pub(super) use motion::{add_support_motion, motion as node_motion};
 use nalgebra::{Matrix3x6, Vector3};
 use scales::Scales;
 use thiserror::Error;

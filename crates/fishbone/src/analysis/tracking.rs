@@ -3,6 +3,7 @@
 mod budget;
 mod led;
 
+use super::sensitivity::NoSensitivity;
 use crate::equilibrium::{AnySolved, Equilibrium, Status, Uncertified};
 use crate::geometry::Wrench;
 use crate::names::named;
@@ -11,7 +12,7 @@ use crate::strip::developable::DevelopableEnergy;
 use crate::strip::shell::{FIELDS, Shell};
 pub use budget::Budget;
 use led::Led;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Matrix3x6, Matrix6, Vector3};
 use stagewise::Residuals;
 use std::ops::ControlFlow;
 use thiserror::Error;
@@ -78,6 +79,28 @@ pub struct Update {
     pub iterations: usize,
     /// Residuals of the shape's discrete equations.
     pub residuals: Residuals,
+}
+
+/// Derivatives of a tracker's shape by the motion of a support: [translation, rotation left in world axes about its point].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Derivatives {
+    /// Of the spine's position at every node.
+    pub position: Vec<Matrix3x6<f64>>,
+    /// Of the frame's rotation at every node, left, in world axes.
+    pub rotation: Vec<Matrix3x6<f64>>,
+    /// Of the support's own reaction: [force, moment], about a point that moves along.
+    pub reaction: Matrix6<f64>,
+}
+
+impl Derivatives {
+    /// Derivatives of material points, one a node, at lines off the spine along its ribs: they move with the frame of their rib,
+    /// as the surface along a rib of a developable belt has one tangent plane.
+    pub fn at(&self, lines: &[Vector3<f64>]) -> Vec<Matrix3x6<f64>> {
+        let nodes = self.position.iter().zip(&self.rotation).zip(lines);
+        nodes
+            .map(|((position, rotation), line)| position - line.cross_matrix() * rotation)
+            .collect()
+    }
 }
 
 /// An equilibrium and the supports that move.
@@ -168,6 +191,33 @@ impl Tracker {
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Result<Update, ScenarioError> {
         of_led!(&mut self.0, led => led.regrasp(hold, release, proceed))
+    }
+
+    /// Derivatives by the motion of any support, by the factorisation that the tracker keeps: no Newton step is taken.
+    ///
+    /// Units: those of the scenario.
+    ///
+    /// # Errors
+    ///
+    /// [`NoSensitivity`] where the belt is taut, or where a part of it has stayed flat under load.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such support.
+    pub fn derivatives(&mut self, support: usize) -> Result<Derivatives, NoSensitivity> {
+        of_led!(&mut self.0, led => led.derivatives(support))
+    }
+
+    /// Lines across the belt at the nodes, ζ − β η: the rib's point at v across is v times this line off the spine. `None` of a
+    /// strip of finite thickness, which is not straight along its ribs.
+    pub fn ribs(&self) -> Option<Vec<Vector3<f64>>> {
+        match &self.0 {
+            AnyLed::Developable(led) => {
+                let nodes = 0..led.poses().len();
+                Some(nodes.map(|node| led.rib(node)).collect())
+            }
+            AnyLed::Shell(_) => None,
+        }
     }
 
     /// Checks goals as [`Self::update`] does, without moving.

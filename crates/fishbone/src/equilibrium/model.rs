@@ -109,6 +109,11 @@ pub(crate) trait StripModel<const F: usize, const N: usize>: Density<F> {
         refinement::turns_too_far(program, shape)
     }
 
+    /// Whether a part of the loaded belt has stayed flat, so that how it begins to twist is not smooth.
+    fn is_flat(_program: &BeltProgram<Self, F, N>, _point: &BeltPoint<F>) -> bool {
+        false
+    }
+
     /// Whether the active sets of a programme depend on its shape.
     fn has_active_sets(_problem: &Problem, _program: &BeltProgram<Self, F, N>) -> bool {
         false
@@ -221,6 +226,10 @@ impl StripModel<2, 8> for DevelopableEnergy {
         to: &BeltProgram,
     ) -> Stationary<BeltPoint> {
         search::prolonged_with_multipliers(from, at, to)
+    }
+
+    fn is_flat(program: &BeltProgram, point: &BeltPoint) -> bool {
+        search::is_flat_under_load(program, point)
     }
 
     fn of_solution(

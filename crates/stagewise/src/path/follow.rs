@@ -264,6 +264,20 @@ where
         solution
     }
 
+    /// The steps of the unknowns and of the equalities' multipliers by which the minimum answers a change of its programme, to
+    /// first order and by the present factorisation. The change is that of the Lagrangian's gradient, by all states and
+    /// controls, and of the equalities.
+    pub fn response(
+        &mut self,
+        gradient: &[NodeVector<N>],
+        equalities: &[f64],
+    ) -> (&[NodeVector<N>], &[f64]) {
+        let kkt = &mut self.iterate.kkt;
+        kkt.pair_targets.fill(0.0);
+        kkt.find_step(gradient, equalities);
+        (&kkt.step, &kkt.multiplier_step)
+    }
+
     /// Length of the stride with which the next way begins, after one that was interrupted.
     pub fn next_stride(&self) -> Option<f64> {
         self.next_stride

@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use stagewise::{Direction, NodeVector};
 
 /// The motion of a node along the step of its state, a twist about the programme's origin.
-pub(super) fn motion<const N: usize>(pose: &Pose, step: &NodeVector<N>) -> Motion {
+pub(in crate::analysis) fn motion<const N: usize>(pose: &Pose, step: &NodeVector<N>) -> Motion {
     let rotation: Vector3<f64> = step.fixed_rows::<3>(3).into_owned();
     Motion {
         translation: step.fixed_rows::<3>(0) + rotation.cross(&pose.position),

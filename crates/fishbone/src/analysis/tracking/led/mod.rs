@@ -1,5 +1,6 @@
 //! An equilibrium of any model of the strip, led by some of its supports.
 
+mod derivatives;
 mod lead;
 mod mesh;
 mod regrasp;

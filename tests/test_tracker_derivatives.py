@@ -1,0 +1,131 @@
+"""Derivatives of a tracker, against those of the equilibrium and against differences of updates."""
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
+
+import fishbone as fb
+
+STEP = 1e-5
+
+
+def led(name="example1", energy="fishbone", elements=64):
+    """A tracker that has been moved, and the pose of its end."""
+    tables = fb.load(f"scenarios/{name}.toml").to_dict() | {"energy": energy}
+    tables["solver"] = tables.get("solver", {}) | {"elements": elements}
+    tracker = fb.Tracker(fb.Scenario.from_dict(tables), -1)
+    turn = Rotation.from_matrix(tracker.frame[-1])
+    position = tracker.position[-1] + 0.02 * tracker.u[-1] * np.array([0.5, -1.0, 0.5])
+    turn = Rotation.from_rotvec([0.05, 0.02, -0.03]) * turn
+    assert tracker.update(position, turn.as_rotvec()).status == "converged"
+    return tracker, position, turn
+
+
+def nudged(tracker, position, turn, column, step):
+    """A copy whose end is moved by a small step of one of the six motions."""
+    other, by = tracker.copy(), step * np.eye(6)[column]
+    goal = position + by[:3], (Rotation.from_rotvec(by[3:]) * turn).as_rotvec()
+    assert other.update(*goal).status == "converged"
+    return other
+
+
+def material(tracker, v):
+    frame, slope = tracker.frame, tracker.rib_slope[:, None]
+    return tracker.position + v * (frame[:, :, 2] - slope * frame[:, :, 1])
+
+
+@pytest.mark.parametrize("name", ["example1", "curved", "bent", "polystyrene"])
+@pytest.mark.parametrize("support", ["start", -1])
+def test_derivatives_of_a_tracker_are_those_of_its_equilibrium(name, support):
+    energy = "shell" if name == "polystyrene" else "fishbone"
+    tracker, *_ = led(name, energy)
+    found = tracker.equilibrium()
+    np.testing.assert_allclose(tracker.jacobian(support), found.jacobian(support), rtol=1e-5, atol=1e-6)
+
+
+@pytest.mark.parametrize("energy", ["fishbone", "wunderlich"])
+def test_jacobian_is_the_ratio_of_differences(energy):
+    tracker, position, turn = led(energy=energy)
+    jacobian = tracker.jacobian()
+    for column in range(6):
+        ends = [nudged(tracker, position, turn, column, sign * STEP).position for sign in (1.0, -1.0)]
+        np.testing.assert_allclose(jacobian[:, :, column], (ends[0] - ends[1]) / (2.0 * STEP), atol=2e-5)
+
+
+def test_stiffness_is_the_ratio_of_differences_of_the_reaction():
+    tracker, position, turn = led()
+    stiffness = tracker.stiffness("end")
+    scale = np.abs(stiffness).max()
+    for column in range(6):
+        ends = [nudged(tracker, position, turn, column, sign * STEP).reaction("end") for sign in (1.0, -1.0)]
+        difference = (np.concatenate(ends[0]) - np.concatenate(ends[1])) / (2.0 * STEP)
+        np.testing.assert_allclose(stiffness[:, column], difference, rtol=1e-3, atol=1e-5 * scale)
+
+
+def test_edges_move_as_the_material_that_is_there():
+    """Where ribs turn, that of a node passes over other material: the edge's own points are found on the flat board."""
+    tracker, position, turn = led(energy="wunderlich", elements=256)
+    v = 0.05
+    assert np.abs(tracker.rib_slope).max() > 0.05
+    flat = tracker.u - v * tracker.rib_slope
+    jacobian = tracker.jacobian(v=v)
+    inside = slice(3, -3)
+    for column in range(6):
+        ends = []
+        for sign in (1.0, -1.0):
+            other = nudged(tracker, position, turn, column, sign * 1e-4)
+            points, places = material(other, v), other.u - v * other.rib_slope
+            ends.append(CubicSpline(places, points)(flat))
+        difference = (ends[0] - ends[1]) / 2e-4
+        np.testing.assert_allclose(jacobian[inside, :, column], difference[inside], atol=3e-3)
+        spine = tracker.jacobian()[inside, :, column]
+        assert np.abs(jacobian[inside, :, column] - spine).max() > 0.03 or column < 3
+
+
+def test_other_supports_have_derivatives_and_pins_none_by_rotation():
+    tables = fb.load("scenarios/example1.toml").to_dict()
+    tables["supports"].insert(1, {"at": 0.5, "position": [0.0, 0.25, 0.3]})
+    tracker = fb.Tracker(fb.Scenario.from_dict(tables | {"solver": {"elements": 64}}), supports=[0.5, "end"])
+    np.testing.assert_array_equal(tracker.jacobian(), tracker.jacobian(0.5))
+    assert np.abs(tracker.jacobian(0.5)[:, :, 3:]).max() == 0.0
+    np.testing.assert_allclose(tracker.jacobian(0.5)[32, :, :3], np.eye(3), atol=1e-7)
+    assert np.abs(tracker.stiffness(0.5)[:, 3:]).max() == 0.0
+    force = tracker.stiffness(0.5)[:3, :3]
+    np.testing.assert_allclose(force, force.T, rtol=1e-6, atol=1e-6 * np.abs(force).max())
+
+
+def test_derivatives_leave_the_tracker_as_it_is():
+    tracker, position, turn = led()
+    other, state = tracker.copy(), tracker.state()
+    tracker.jacobian(), tracker.stiffness("start")
+    assert tracker.state() == state
+    goal = position + np.array([0.01, 0.0, 0.0]), turn.as_rotvec()
+    assert repr(tracker.update(*goal)) == repr(other.update(*goal))
+    np.testing.assert_array_equal(tracker.position, other.position)
+
+
+def test_a_taut_belt_has_no_derivatives():
+    tracker = fb.Tracker(fb.load("scenarios/example1.toml"))
+    tracker.update([0.0, 1.0, 0.0], [0.0, 0.0, 0.0])
+    with pytest.raises(fb.NoSensitivity, match="has no slack"):
+        tracker.jacobian()
+
+
+@pytest.mark.parametrize(
+    ("ask", "kind", "words"),
+    [
+        (lambda tracker: tracker.jacobian(0.3), fb.NoSupport, "support 0.3: found supports at"),
+        (lambda tracker: tracker.jacobian(v=float("nan")), fb.InvalidArgument, "v: found nan, allowed finite numbers"),
+        (lambda tracker: tracker.jacobian(v=[1.0]), fb.InvalidArgument, r"v: found shape \(1,\), allowed \(\)"),
+    ],
+)
+def test_derivatives_of_nothing_are_refused(ask, kind, words):
+    with pytest.raises(kind, match=f"^{words}"):
+        ask(led()[0])
+
+
+def test_points_off_the_spine_of_a_thick_strip_are_refused():
+    tracker, *_ = led("polystyrene", "shell")
+    with pytest.raises(fb.InvalidArgument, match=r'^v: found 0\.001 with energy = "shell", allowed 0'):
+        tracker.jacobian(v=1e-3)
