@@ -110,8 +110,14 @@ def rows_of(path):
 
 def spawned():
     """The processes of clusters that this one has started."""
-    children = psutil.Process().children(recursive=True)
-    return [one for one in children if "multiprocessing.spawn" in " ".join(one.cmdline())]
+
+    def is_spawned(process):
+        try:
+            return "multiprocessing.spawn" in " ".join(process.cmdline())
+        except (psutil.ZombieProcess, psutil.NoSuchProcess):  # it has ended just now
+            return False
+
+    return [one for one in psutil.Process().children(recursive=True) if is_spawned(one)]
 
 
 # ---------------------------------------------------------------------------------------------------- the points

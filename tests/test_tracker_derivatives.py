@@ -79,8 +79,7 @@ def test_edges_move_as_the_material_that_is_there():
             ends.append(CubicSpline(places, points)(flat))
         difference = (ends[0] - ends[1]) / 2e-4
         np.testing.assert_allclose(jacobian[inside, :, column], difference[inside], atol=3e-3)
-        spine = tracker.jacobian()[inside, :, column]
-        assert np.abs(jacobian[inside, :, column] - spine).max() > 0.03 or column < 3
+    assert np.abs(jacobian - tracker.jacobian())[inside].max() > 0.04
 
 
 def test_other_supports_have_derivatives_and_pins_none_by_rotation():

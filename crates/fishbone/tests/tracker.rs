@@ -191,12 +191,9 @@ fn test_shape_moves_along_with_both_of_its_ends() {
 fn test_pin_and_hinge_move_as_they_are_solved_for() {
     let held = |middle: &str| {
         let end = "{ at = 'end', position = [0, 0.75, 0.1], rotation = [0, 0, 0]";
-        format!(
-            "{}",
-            clamped(0.5).replace(
-                "{ at = 'end', position = [0, 0.5, 0.1], rotation = [0, 0, 0] },",
-                &format!("{middle} {end} }}")
-            )
+        clamped(0.5).replace(
+            "{ at = 'end', position = [0, 0.5, 0.1], rotation = [0, 0, 0] },",
+            &format!("{middle} {end} }}"),
         )
     };
     let pin = |z: f64| held(&format!("{{ at = 0.5, position = [0, 0.35, {z}] }},"));

@@ -27,6 +27,17 @@ struct Stored<B, P, A, M, O, S, L> {
     potential_of_origin: f64,
 }
 
+/// The data, owned.
+type Owned<D, const F: usize, const N: usize> = Stored<
+    Problem,
+    BeltProgram<D, F, N>,
+    Stationary<BeltPoint<F>>,
+    Vec<usize>,
+    Vec<Pose>,
+    Vec<SVector<f64, F>>,
+    Option<Flat>,
+>;
+
 impl<D, const F: usize, const N: usize> Serialize for Led<D, F, N>
 where
     D: StripModel<F, N> + Serialize,
@@ -53,15 +64,7 @@ where
     D: StripModel<F, N> + Deserialize<'de>,
 {
     fn deserialize<R: Deserializer<'de>>(deserializer: R) -> Result<Self, R::Error> {
-        let stored: Stored<
-            Problem,
-            BeltProgram<D, F, N>,
-            Stationary<BeltPoint<F>>,
-            Vec<usize>,
-            Vec<Pose>,
-            Vec<SVector<f64, F>>,
-            Option<Flat>,
-        > = Deserialize::deserialize(deserializer)?;
+        let stored: Owned<D, F, N> = Deserialize::deserialize(deserializer)?;
         let shape = D::shape(&stored.problem, &stored.program, &stored.at.point);
         let follower = Self::follower(&stored.problem, stored.program, &stored.at);
         let mut follower = follower.map_err(R::Error::custom)?;
