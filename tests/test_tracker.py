@@ -285,3 +285,16 @@ def test_the_residual_of_an_update_is_the_distance_of_the_support_from_its_pose(
         off = np.linalg.norm(tracker.position[-1] - position) / tracker.u[-1]
         assert off <= 2.0 * update.residual + 1e-15
         assert update.residual < 1e-8
+
+
+def test_a_tracker_at_each_of_the_branches_stays_on_it() -> None:
+    """Around a closed path of poses; the minima differ, and so do the trackers all the way."""
+    minima = [found for found in fb.branches(example("wunderlich", elements=40)) if found.stable]
+    assert len(minima) >= 3
+    trackers = [fb.Tracker(found) for found in minima]
+    for position, rotation in way(60):
+        updates = [tracker.update(position, rotation) for tracker in trackers]
+        assert {(update.status, update.snapped) for update in updates} == {("converged", False)}
+    for tracker, found in zip(trackers, minima, strict=True):
+        assert tracker.energy == pytest.approx(found.energy, rel=1e-6)
+        np.testing.assert_allclose(tracker.position, found.position, atol=1e-5)
