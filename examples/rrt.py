@@ -15,7 +15,7 @@ TRIES, STEP, BIAS = 5000, 0.03, 0.1
 LOW, HIGH = np.array([-0.1, 0.3, 0.0, -0.1, -0.3, -0.1]), np.array([0.35, 0.7, 0.3, 0.5, 0.3, 0.5])
 """Positions and rotation vectors of the end that are tried."""
 GOAL = np.array([0.25, 0.45, 0.2, 0.3, 0.0, 0.4])
-BALL, RADIUS = np.array([0.36, 0.3, 0.15]), 0.04
+BALL, RADIUS = np.array([0.36, 0.3, 0.15]), 0.03
 
 
 def is_free(tracker: fb.Tracker) -> bool:

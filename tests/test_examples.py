@@ -91,11 +91,12 @@ def test_an_example_without_its_package_ends_with_the_command_that_installs_it(m
 def test_a_random_tree_of_trackers_grows_around_the_ball(capsys):
     names = runpy.run_path(EXAMPLES / "rrt.py")
     trackers, poses, parents = names["trackers"], names["poses"], names["parents"]
-    assert len(trackers) > 500
-    for tracker, pose in list(zip(trackers, poses, strict=False))[::100]:
+    assert len(trackers) > 100
+    for tracker, pose in list(zip(trackers, poses, strict=False))[::20]:
         np.testing.assert_allclose(tracker.position[-1], pose[:3], atol=1e-7)
         assert tracker.equilibrium().status == "converged"
         assert names["is_free"](tracker)
     steps = np.linalg.norm(poses[1 : len(trackers)] - poses[parents[1:]], axis=1)
     assert steps.max() <= names["STEP"] * (1.0 + 1e-9)
+    assert np.linalg.norm(poses[len(trackers) - 1] - names["GOAL"]) < names["STEP"]
     assert f"{len(trackers)} nodes of {names['tried']} steps" in capsys.readouterr().out
