@@ -51,7 +51,7 @@ class Update(NamedTuple):
     fraction: float
     """Share of the way to the new poses that was reached, 1 where "converged". The tracker is there, in equilibrium."""
     taut: bool
-    """Whether the belt is pulled so straight that its shape does not determine all reactions: these are NaN."""
+    """Whether the belt has no slack, so that its shape does not determine all reactions: these are NaN."""
     crosses_itself: bool | None
     """Whether the belt passes through itself, as `Equilibrium.crosses_itself` finds; None unless this was asked for."""
 
@@ -286,7 +286,7 @@ class Tracker:
 
         Shapes: (n, 3, 6).
         Units: `v` in those of the scenario.
-        Errors: `NoSupport`; `NoSensitivity` where the belt is taut or a part of it has stayed flat under load;
+        Errors: `NoSupport`; `NoSensitivity` where the belt has no slack or a part of it has stayed flat under load;
         `InvalidArgument` of points off the spine with the energy "shell".
         """
         return self._inner.derivatives(self._index_or_first(support), float(numbers_of("v", v, ())))[0]

@@ -161,7 +161,7 @@ typedef struct FishboneUpdate {
    */
   double fraction;
   /**
-   * Whether the belt is pulled so straight that its shape does not determine all reactions: these are not a number.
+   * Whether the belt has no slack, so that its shape does not determine all reactions: these are not a number.
    */
   bool taut;
   /**

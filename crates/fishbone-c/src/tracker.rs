@@ -93,7 +93,7 @@ pub struct FishboneUpdate {
     pub status: FishboneOutcome,
     /// Share of the way to the goals that was reached.
     pub fraction: f64,
-    /// Whether the belt is pulled so straight that its shape does not determine all reactions: these are not a number.
+    /// Whether the belt has no slack, so that its shape does not determine all reactions: these are not a number.
     pub taut: bool,
     /// Whether the equilibrium that was followed ceased to exist or to be stable on the way, or could not be followed, and
     /// the belt has snapped to another one.

@@ -61,7 +61,7 @@ impl Shown {
 }
 
 /// Status, whether it snapped, energy, iterations, residual of the supports, largest displacement and energy released in snaps,
-/// message, whether it was solved afresh, share of the way, whether the belt is taut, whether it crosses itself.
+/// message, whether it was solved afresh, share of the way, whether the belt has no slack, whether it crosses itself.
 type Updated = (
     &'static str,
     bool,

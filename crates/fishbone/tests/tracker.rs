@@ -64,8 +64,8 @@ fn test_update_ends_in_the_equilibrium_of_its_pose() {
 }
 
 /// Counts the allocations of updates in which the end of a belt of 80 elements moves from (0, 0.5, 0.1), with some tables
-/// of the scenario in place of a straight belt.
-fn allocations(energy: &str, segments: &str, links: &str) -> u64 {
+/// of the scenario in place of a straight belt, in steps of a length.
+fn allocations(energy: &str, segments: &str, links: &str, length: f64) -> u64 {
     let toml = format!("energy = '{energy}'\nlinks = [{links}]\n{}", clamped(0.5));
     let straight = "{ kind = 'straight', length = 1.0 }";
     let equilibrium = solved(&toml.replace(straight, segments));
@@ -73,7 +73,7 @@ fn allocations(energy: &str, segments: &str, links: &str) -> u64 {
     update(&mut tracker, 0.501, 0.001);
     let allocated = allocation_counter::measure(|| {
         for step in 2..100 {
-            let share = f64::from(step) * 5e-4;
+            let share = f64::from(step) * length;
             let followed = update(&mut tracker, 0.5 + share, share);
             assert_eq!(
                 (followed.status, followed.snapped),
@@ -95,10 +95,22 @@ fn test_update_allocates_nothing_after_the_first() {
         "{ kind = 'arc', length = 0.5, curvature = 1.4 }, { kind = 'straight', length = 0.5 }";
     let link = "{ from = 0.3, to = 0.7, offset = [0, 0.2, 0.05] }";
     for energy in ["fishbone", "wunderlich"] {
-        for segments in [straight, bend, stiffener, arc] {
-            assert_eq!(allocations(energy, segments, ""), 0, "{energy} {segments}");
+        // In longer steps the belt beside the bend comes to a place that is hard to follow.
+        let boards = [
+            (straight, 1e-3),
+            (bend, 5e-4),
+            (stiffener, 1e-3),
+            (arc, 5e-4),
+        ];
+        for (segments, length) in boards {
+            let allocated = allocations(energy, segments, "", length);
+            assert_eq!(allocated, 0, "{energy} {segments}");
         }
-        assert_eq!(allocations(energy, straight, link), 0, "{energy} {link}");
+        assert_eq!(
+            allocations(energy, straight, link, 5e-4),
+            0,
+            "{energy} {link}"
+        );
     }
 }
 

@@ -64,7 +64,7 @@ pub struct Update {
     pub fraction: f64,
     /// Whether the belt could not be followed to the goals, so that its problem there was solved afresh.
     pub solved_afresh: bool,
-    /// Whether the belt is pulled so straight that its shape does not determine all reactions: these are NaN.
+    /// Whether the belt has no slack, so that its shape does not determine all reactions: these are NaN.
     pub taut: bool,
     /// Whether the equilibrium that was followed ceased to exist or to be stable on the way, or could not be followed, and
     /// the belt has snapped to another equilibrium, by `solver.snap_size` or more.
@@ -199,7 +199,7 @@ impl Tracker {
     ///
     /// # Errors
     ///
-    /// [`NoSensitivity`] where the belt is taut, or where a part of it has stayed flat under load.
+    /// [`NoSensitivity`] where the belt has no slack, or where a part of it has stayed flat under load.
     ///
     /// # Panics
     ///

@@ -31,7 +31,12 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
             return Status::Converged;
         }
         let better = self.on_mesh_that_carries(way, proceed);
-        self.watched = change.max(self.watched);
+        // A search that was stopped is made up for by the next update.
+        let is_stopped = better.is_none() && proceed().is_break();
+        self.watched = match is_stopped {
+            true => 0.0,
+            false => change.max(self.watched),
+        };
         let is_carried = match better {
             Some(better) => {
                 self.watched = 0.0;
