@@ -20,7 +20,7 @@ from tables import ROOT, table, write
 
 RATIOS = (10, 20, 50, 100, 300)
 """Length over width, U/V."""
-PASSES, SLENDER = 3, 100
+PASSES, SLENDER = 3, 50
 """Passes along each way; a board of this ratio or more, whose updates take long, goes along it once."""
 STEPS, LOOP = 1000, 120
 """Updates of each way."""
@@ -31,7 +31,7 @@ SWING, TURN = 0.03, 0.15
 HALF = {"kind": "straight", "length": 0.5}
 BOARDS: dict[str, dict[str, Any]] = {
     "straight": {"segments": [{"kind": "straight", "length": 1.0}]},
-    "bent": {"segments": [HALF, {"kind": "bend", "angle": 0.3}, HALF]},
+    "bent": {"segments": [HALF, {"kind": "corner", "angle": 0.3}, HALF]},
     "curved": {"segments": [{"kind": "arc", "length": 1.0, "curvature": 0.8}]},
     "linked": {"segments": [{"kind": "straight", "length": 1.0}]},
 }

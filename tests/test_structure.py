@@ -11,7 +11,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 LONGEST = 500
 """Lines of code of a file, the largest number: without its tests, comments, docstrings and blank lines."""
-PUBLIC = 257
+PUBLIC = 259
 """Items of the core that other crates may use, the largest number."""
 TEST_MODULE = re.compile(r"^#\[cfg\(test\)\]\nmod \w+ \{", re.MULTILINE)
 PUBLIC_ITEM = re.compile(r"^\s*pub (?:const )?(?:fn|struct|enum|trait|const|type|static)\b", re.MULTILINE)

@@ -154,6 +154,55 @@ def test_mesh_of_a_tracker_follows_the_error() -> None:
     assert tracker.reaction("end").force[1] == pytest.approx(fine.reaction("end").force[1], rel=1e-2)
 
 
+def test_an_update_that_is_stopped_leaves_the_estimate_of_its_mesh_to_the_next_one() -> None:
+    """Where the search on a finer mesh needs more iterations than the limit allows."""
+    tracker = fb.Tracker(ends_past_each_other(-0.5, solver={}))
+    before = len(tracker.u)
+    for y in np.linspace(-0.5, -0.95, 46):
+        for _ in range(30):
+            if tracker.update([0.0, y, 0.0], np.zeros(3), max_iterations=10).status == "converged":
+                break
+    assert len(tracker.u) == before
+    assert tracker.update([0.0, -0.95, 0.0], np.zeros(3)).status == "converged"
+    assert len(tracker.u) > before
+
+
+def test_the_mesh_of_a_slender_belt_does_not_grow_from_step_to_step() -> None:
+    """Where ribs turn beside the clamp, graded anew at every update: there each mesh used to be finer than the last."""
+    tables = example().to_dict()
+    tables["belt"]["width"] = 0.01
+    tables["solver"] = {}
+    tables["supports"][1] |= {"position": [0.05, 0.7, 0.0]}
+    tracker = fb.Tracker(fb.Scenario.from_dict(tables))
+    for angle in np.linspace(2.86, 3.06, 26):
+        shift = 0.016 * np.array([np.sin(angle), 0.7 * np.sin(2.0 * angle), np.cos(angle) - 1.0])
+        turn = 0.016 * np.array([np.sin(angle), np.sin(2.0 * angle), 0.4 * (np.cos(angle) - 1.0)])
+        assert tracker.update(np.array([0.05, 0.7, 0.0]) + shift, turn).status == "converged"
+    again = fb.solve(tracker.equilibrium().scenario)
+    assert len(tracker.u) < 1.5 * len(again.u)
+    assert tracker.energy == pytest.approx(again.energy, rel=1e-4)
+
+
+@pytest.mark.parametrize("energy", ENERGIES)
+def test_a_belt_whose_ends_meet_is_followed_there_and_away(energy: Energy) -> None:
+    """Its closed figure slides along itself at no cost: the minimum is no strict one."""
+    tracker = fb.Tracker(example(energy))
+    turn = np.zeros(3)
+    update = tracker.update(np.zeros(3), turn)
+    assert (update.status, update.snapped) == ("converged", False)
+    here = tracker.equilibrium()
+    assert (here.status, here.stable) == ("converged", None)
+    assert update.energy == pytest.approx(fb.solve(here.scenario).energy, rel=1e-6)
+    restored = fb.Tracker.restore(tracker.state())
+    for y in (0.001, 0.01, 0.1, 0.01, 0.0, 0.2):
+        update = tracker.update([0.0, y, 0.0], turn)
+        assert (update.status, update.snapped) == ("converged", False)
+        assert repr(restored.update([0.0, y, 0.0], turn)) == repr(update)
+    fresh = example(energy).to_dict()
+    fresh["supports"][1] |= {"position": [0.0, 0.2, 0.0]}
+    assert update.energy == pytest.approx(fb.solve(fb.Scenario.from_dict(fresh)).energy, rel=1e-6)
+
+
 def test_tracker_stops_where_elements_turn_too_far_for_a_belt() -> None:
     """On a fixed mesh, at a pose where a solve does not converge; it keeps its last pose, and goes on from there."""
     tracker = fb.Tracker(ends_past_each_other(-0.5, elements=40))

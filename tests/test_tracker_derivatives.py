@@ -104,6 +104,54 @@ def test_derivatives_leave_the_tracker_as_it_is():
     np.testing.assert_array_equal(tracker.position, other.position)
 
 
+def lowest(tracker):
+    return tracker.equilibrium().modes(1)[0].eigenvalue
+
+
+@pytest.mark.parametrize(
+    ("name", "energy"), [("example1", "wunderlich"), ("curved", "fishbone"), ("polystyrene", "shell")]
+)
+def test_gradient_of_the_lowest_eigenvalue_is_the_ratio_of_differences(name, energy):
+    tracker, position, turn = led(name, energy)
+    found = tracker.lowest_eigenvalue()
+    assert found.value == pytest.approx(lowest(tracker), rel=1e-7)
+    units = np.array([*3 * [tracker.u[-1]], 1.0, 1.0, 1.0])
+    tolerance = 1e-3 * np.abs(found.gradient * units).max() / units
+    for column in range(6):
+        # Of steps of another size than the tracker's own.
+        step = 1e-4 * units[column]
+        sides = [lowest(nudged(tracker, position, turn, column, sign * step)) for sign in (1.0, -1.0)]
+        difference = (sides[0] - sides[1]) / (2.0 * step)
+        assert found.gradient[column] == pytest.approx(difference, abs=tolerance[column])
+
+
+def test_the_lowest_eigenvalue_does_not_change_where_all_supports_move_as_one():
+    tracker = fb.Tracker(fb.load("scenarios/example2.toml"), supports=["start", "end"])
+    start, end = (tracker.lowest_eigenvalue(place).gradient for place in ("start", "end"))
+    largest = np.abs(end).max()
+    np.testing.assert_allclose(start[:3] + end[:3], 0.0, atol=1e-6 * largest)
+    arm = tracker.position[-1] - tracker.position[0]
+    about_start = start[3:] + end[3:] + np.cross(arm, end[:3])
+    np.testing.assert_allclose(about_start, 0.0, atol=1e-6 * largest)
+
+
+def test_the_lowest_eigenvalue_and_its_gradient_lead_to_the_snap():
+    """Near a fold the eigenvalue is the root of the way that is left: an arch whose end is turned back snaps there."""
+    tables = fb.load("scenarios/example1.toml").to_dict() | {"energy": "sadowsky", "solver": {"elements": 80}}
+    tables["supports"][1] |= {"position": [0.0, 0.9, 0.0]}
+    tracker = fb.Tracker(fb.Scenario.from_dict(tables))
+    ahead, last = tracker.copy(), 0.0
+    for angle in np.arange(-0.01, -1.0, -0.01):
+        if ahead.update([0.0, 0.9, 0.0], [0.0, 0.0, angle]).snapped:
+            break
+        tracker, last = ahead.copy(), angle
+    found = tracker.lowest_eigenvalue()
+    left = found.value / (2.0 * found.gradient[5])
+    assert 0.0 < left < 0.012
+    assert tracker.copy().update([0.0, 0.9, 0.0], [0.0, 0.0, last - 0.9 * left]).snapped is False
+    assert tracker.copy().update([0.0, 0.9, 0.0], [0.0, 0.0, last - 1.1 * left]).snapped is True
+
+
 def test_a_taut_belt_has_no_derivatives():
     tracker = fb.Tracker(fb.load("scenarios/example1.toml"))
     tracker.update([0.0, 1.0, 0.0], [0.0, 0.0, 0.0])
@@ -115,6 +163,12 @@ def test_a_taut_belt_has_no_derivatives():
     ("ask", "kind", "words"),
     [
         (lambda tracker: tracker.jacobian(0.3), fb.NoSupport, "support 0.3: found supports at"),
+        (lambda tracker: tracker.lowest_eigenvalue(0.3), fb.NoSupport, "support 0.3: found supports at"),
+        (
+            lambda tracker: tracker.lowest_eigenvalue("start"),
+            fb.InvalidArgument,
+            "support: found 0, which does not move",
+        ),
         (lambda tracker: tracker.jacobian(v=float("nan")), fb.InvalidArgument, "v: found nan, allowed finite numbers"),
         (lambda tracker: tracker.jacobian(v=[1.0]), fb.InvalidArgument, r"v: found shape \(1,\), allowed \(\)"),
     ],

@@ -52,7 +52,7 @@ from fishbone.pose import Pose
 from fishbone.scenario import Scenario, load
 from fishbone.sensitivity import Change, Gradient, Sensitivity
 from fishbone.sweep import Sweep, sweep
-from fishbone.tracker import Tracker, Update, Updates
+from fishbone.tracker import LowestEigenvalue, Tracker, Update, Updates
 
 __all__ = [
     "AreaRadii",
@@ -71,6 +71,7 @@ __all__ = [
     "Internal",
     "InvalidArgument",
     "InvalidScenario",
+    "LowestEigenvalue",
     "MeshError",
     "MissingPackage",
     "Mode",

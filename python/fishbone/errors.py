@@ -109,9 +109,9 @@ class NoModes(FishboneError):  # noqa: N818
 class NoTracker(FishboneError):  # noqa: N818
     """There is no equilibrium to track, or its support cannot be moved."""
 
-    reason: Literal["no_multipliers", "not_converged", "not_held", "no_support", "marginal"] | None = None
+    reason: Literal["no_multipliers", "not_converged", "not_held", "no_support", "no_minimum"] | None = None
     """The reason: the source's method has no multipliers; the solve has not converged; the support does not
-    hold a whole pose; there is no such support; or the equilibrium is no strict minimum."""
+    hold a whole pose; there is no such support; or the equilibrium is no minimum."""
     support: int | None = None
     """Index of the support that does not hold a whole pose, or does not exist."""
     solve_message: str | None = None

@@ -76,6 +76,19 @@ class Updates(NamedTuple):
     """Moment of the moving support on the belt about the support point, shape (m, 3), or (m, k, 3)."""
 
 
+class LowestEigenvalue(NamedTuple):
+    """The lowest eigenvalue of a `Tracker`'s second variation, and how it changes with the motion of a support.
+
+    The shape is stable where it is positive; where it comes to zero the belt snaps, or other shapes branch off.
+    """
+
+    value: float
+    """The eigenvalue of the first of `Equilibrium.modes`: twice the rise of the energy per squared displacement."""
+    gradient: Floats
+    """Derivatives by [translation, left world-axes rotation about the support point], shape (6,). NaN where the shape
+    cannot be followed either way; where it can be followed one way alone they are those of this side."""
+
+
 class Tracker:
     """A minimum of a belt whose supports move: every update starts from the shape before, and stays on its branch.
 
@@ -301,6 +314,18 @@ class Tracker:
         Errors: as `jacobian`.
         """
         return self._inner.derivatives(self._index_or_first(support), 0.0)[1]
+
+    def lowest_eigenvalue(self, support: Place | None = None) -> LowestEigenvalue:
+        """The lowest eigenvalue of the second variation, and its gradient by the motion of a support that moves.
+
+        By default this is the first of them. The gradient is that of central differences: copies of the tracker follow
+        the shape for 1e-5 of the length, or of a radian, to either side.
+
+        Units: those of the scenario; rad.
+        Errors: `NoSupport`; `InvalidArgument` of a support that does not move; `NoModes` where the second variation is
+        singular.
+        """
+        return LowestEigenvalue(*self._inner.lowest_eigenvalue(self._index_or_first(support)))
 
     def _index_or_first(self, support: Place | None) -> int:
         return self._inner.moving[0] if support is None else self._index_of(support)

@@ -287,6 +287,31 @@ impl Tracker {
         ))
     }
 
+    /// The lowest eigenvalue of the second variation, and its derivatives by the motion of a support that moves.
+    ///
+    /// Shapes: (6,).
+    /// Errors: `NoModes`; `InvalidArgument` of a support that does not move; as `update`, but for the pose.
+    fn lowest_eigenvalue<'py>(
+        &self,
+        py: Python<'py>,
+        support: usize,
+    ) -> PyResult<(f64, Scalars<'py>)> {
+        let found = self.moving.with(py, |tracker, signals| {
+            if !tracker.moving().contains(&support) {
+                return None;
+            }
+            Some(tracker.lowest_eigenvalue(support, &mut || signals.proceed()))
+        })?;
+        let Some(found) = found else {
+            return Err(InvalidArgument::new_err(format!(
+                "support: found {support}, which does not move, allowed those that the tracker moves"
+            )));
+        };
+        let found = found.map_err(|error| raised(py, &error))?;
+        let gradient = found.gradient.as_slice().to_vec();
+        Ok((found.value, gradient.into_pyarray(py)))
+    }
+
     /// The present scenario and its equilibrium.
     ///
     /// Errors: as `update`, but for the pose.

@@ -34,8 +34,8 @@ pub use linear::{
 };
 pub use linearisation::Linearisation;
 pub use path::{
-    Continuation, Curve, End, Event, Events, Family, FollowSettings, Followed, Follower, Pace,
-    Station, Turn, by_differences, over_modal_load, settle,
+    Continuation, Curve, End, Event, Events, Family, FollowSettings, Followed, Follower,
+    NextStride, Pace, Station, Turn, by_differences, over_modal_load, settle,
 };
 pub use program::{Distance, Multipliers, Program, Scales, Stationary, Values};
 

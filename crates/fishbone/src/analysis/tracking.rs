@@ -3,6 +3,7 @@
 mod budget;
 mod led;
 
+use super::modes::NoModes;
 use super::sensitivity::NoSensitivity;
 use crate::equilibrium::{AnySolved, Equilibrium, Status, Uncertified};
 use crate::geometry::Wrench;
@@ -12,7 +13,7 @@ use crate::strip::developable::DevelopableEnergy;
 use crate::strip::shell::{FIELDS, Shell};
 pub use budget::Budget;
 use led::Led;
-use nalgebra::{Matrix3, Matrix3x6, Matrix6, Vector3};
+use nalgebra::{Matrix3, Matrix3x6, Matrix6, Vector3, Vector6};
 use stagewise::Residuals;
 use std::ops::ControlFlow;
 use thiserror::Error;
@@ -30,15 +31,15 @@ pub enum NoTracker {
     /// There is no such support.
     #[error("the scenario has no supports[{0}] that could move")]
     NoSupport(usize),
-    /// The shape may change at no cost of energy.
-    #[error("the equilibrium is no strict minimum of the energy: there is no one branch to follow")]
-    Marginal,
+    /// The energy is no minimum.
+    #[error("the equilibrium is no minimum of the energy: there is nothing to follow")]
+    NoMinimum,
 }
 
 named!(impl NoTracker {
     NotHeld = "not_held",
     NoSupport = "no_support",
-    Marginal = "marginal",
+    NoMinimum = "no_minimum",
     ..Uncertified,
 });
 
@@ -103,6 +104,17 @@ impl Derivatives {
     }
 }
 
+/// The lowest eigenvalue of the second variation of the energy, and how it changes with the motion of a support. The shape is
+/// stable where it is positive; where it comes to zero the belt snaps, or other shapes branch off.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LowestEigenvalue {
+    /// The eigenvalue of the lowest [`Mode`](super::modes::Mode).
+    pub value: f64,
+    /// Its derivatives by the motion of the support: [translation, rotation left in world axes about its point]. NaN where the
+    /// shape can be followed neither way, of one side where it can be followed that way alone.
+    pub gradient: Vector6<f64>,
+}
+
 /// An equilibrium and the supports that move.
 #[derive(Clone)]
 #[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
@@ -131,7 +143,7 @@ impl Tracker {
     ///
     /// # Errors
     ///
-    /// [`NoTracker`] unless it has converged to a strict minimum and each of the supports holds a position.
+    /// [`NoTracker`] unless it has converged to a minimum and each of the supports holds a position.
     pub fn new(equilibrium: &Equilibrium, moving: &[usize]) -> Result<Self, NoTracker> {
         let led = match equilibrium.certified_any()? {
             AnySolved::Developable(solved) => {
@@ -206,6 +218,22 @@ impl Tracker {
     /// If there is no such support.
     pub fn derivatives(&mut self, support: usize) -> Result<Derivatives, NoSensitivity> {
         of_led!(&mut self.0, led => led.derivatives(support))
+    }
+
+    /// The lowest eigenvalue of the second variation, and its gradient by the motion of a support that moves: by central
+    /// differences, each of which follows the shape by 1e-5 of the belt's length or of a radian.
+    ///
+    /// Units: those of the scenario; rad.
+    ///
+    /// # Errors
+    ///
+    /// [`NoModes`] where the second variation cannot be factorised.
+    pub fn lowest_eigenvalue(
+        &self,
+        support: usize,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Result<LowestEigenvalue, NoModes> {
+        of_led!(&self.0, led => led.lowest_eigenvalue(support, proceed))
     }
 
     /// Lines across the belt at the nodes, ζ − β η: the rib's point at v across is v times this line off the spine. `None` of a

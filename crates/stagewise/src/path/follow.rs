@@ -1,7 +1,11 @@
 //! Predictor–corrector: follows a minimum while its programme changes. The predictor uses the last factorisation, the
 //! corrector is Newton's method. Steps that might lead to another minimum are refused, and the loss of a minimum is reported.
+//!
+//! At a marginal minimum, along a direction of which the objective does not change, Newton's method is damped: its steps leave
+//! this direction as it is.
 
 use crate::interior_point::{Outcome, PrimalDual, Residuals, Settings, Solution, minimise};
+use crate::linear::Inertia;
 use crate::linear::chain::NodeVector;
 use crate::program::{Distance, Multipliers, Program, Stationary, Values};
 use std::ops::ControlFlow;
@@ -31,12 +35,21 @@ pub struct Follower<P: Program<X, U, N>, const X: usize, const U: usize, const N
     settings: FollowSettings,
     /// The last minimum on the way.
     last: Stationary<P::Point>,
-    /// The minimum to return to.
-    first: Stationary<P::Point>,
+    /// The minimum to return to, and the damping there.
+    first: (Stationary<P::Point>, f64),
     /// Room for the gradients of the equalities at nodes.
     gradients: Vec<NodeVector<N>>,
-    /// Length of the stride with which a way that was interrupted goes on.
-    next_stride: Option<f64>,
+    next_stride: NextStride,
+}
+
+/// How a follower goes on from its minimum.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct NextStride {
+    /// Length of the stride with which a way that was interrupted goes on; `None`: that of the whole way.
+    length: Option<f64>,
+    /// Damping of Newton's method, of the controls per unit weight: 0 at a strict minimum.
+    damping: f64,
 }
 
 /// Settings of a follower.
@@ -63,11 +76,14 @@ struct Way {
 /// Ratio of the distance between minima to the length of the way up to which the way is smooth; dimensionless.
 const SMOOTH: f64 = 100.0;
 
+/// Damping of the controls per unit weight at a marginal minimum; objective per squared control.
+const MARGINAL: f64 = 1e-3;
+
 impl<P: Program<X, U, N>, const X: usize, const U: usize, const N: usize> Follower<P, X, U, N>
 where
     P::Point: Distance,
 {
-    /// Starts at a minimum; `None` where the point is no regular minimum.
+    /// Starts at a minimum, strict or marginal; `None` where the point is neither.
     pub fn new(
         program: P,
         settings: FollowSettings,
@@ -78,15 +94,16 @@ where
         let heaviest = iterate.barrier.heaviest();
         iterate.barrier.parameter = 0.5 * settings.tolerance / heaviest;
         let mut follower = Self {
-            first: minimum.clone(),
+            first: (minimum.clone(), 0.0),
             gradients: iterate.kkt.linear.equalities_at.clone(),
             iterate,
             settings,
             last: minimum.clone(),
-            next_stride: None,
+            next_stride: NextStride::default(),
         };
         let started = follower.start_from(minimum);
         follower.keep();
+        follower.depart();
         started.then_some(follower)
     }
 
@@ -141,6 +158,7 @@ where
             done: 0.0,
             stride: self
                 .next_stride
+                .length
                 .take()
                 .map_or(1.0, |stride| (stride / length).min(1.0)),
             iterations: 0,
@@ -152,7 +170,7 @@ where
         let shortest = hidden.clamp(SHORTEST_STRIDES[0], SHORTEST_STRIDES[1]);
         while way.done < 1.0 && way.leaps < MOST_LEAPS {
             if proceed().is_break() {
-                self.next_stride = Some(way.stride * length);
+                self.next_stride.length = Some(way.stride * length);
                 break;
             }
             let next = (way.done + way.stride).min(1.0);
@@ -165,6 +183,7 @@ where
             };
             if arrived {
                 self.keep();
+                self.go_on_undamped();
                 way.done = next;
                 way.stride *= 2.0;
             } else if way.stride <= shortest {
@@ -230,8 +249,21 @@ where
         self.start_from(&found.at)
     }
 
-    /// Starts from a minimum; false where the point is no regular minimum.
+    /// Starts from a minimum, strict or marginal; false where the point is neither.
     fn start_from(&mut self, minimum: &Stationary<P::Point>) -> bool {
+        let before = self.next_stride.damping;
+        let started = self.start_damped(minimum, 0.0)
+            || self.start_damped(minimum, MARGINAL)
+                && self.inertia().is_some_and(|i| i.negative == 0);
+        if !started {
+            self.next_stride.damping = before;
+        }
+        started
+    }
+
+    /// Starts from a minimum with a given damping; false where the point is no minimum of the damped programme.
+    fn start_damped(&mut self, minimum: &Stationary<P::Point>, damping: f64) -> bool {
+        self.next_stride.damping = damping;
         let iterate = &mut self.iterate;
         iterate.point.copy_from(&minimum.point);
         iterate.multipliers.copy_from(&minimum.multipliers);
@@ -243,12 +275,28 @@ where
         admissible && kept
     }
 
+    /// Goes on without damping from a minimum that is strict again.
+    fn go_on_undamped(&mut self) {
+        if self.next_stride.damping > 0.0 {
+            self.iterate.assemble();
+            if self
+                .iterate
+                .kkt
+                .factorise_damped(-self.next_stride.damping)
+                .is_ok()
+            {
+                self.next_stride.damping = 0.0;
+            }
+            self.factorise();
+        }
+    }
+
     /// The present minimum as a solution.
     pub fn solution(&mut self) -> Solution<P::Point> {
         let residuals = self.iterate.residuals();
-        let iterate = &mut self.iterate;
-        let inertia = iterate.inertia();
-        let solution = Solution {
+        let inertia = self.inertia();
+        let iterate = &self.iterate;
+        Solution {
             at: Stationary {
                 point: iterate.point.clone(),
                 multipliers: iterate.multipliers.clone(),
@@ -258,10 +306,15 @@ where
             iterations: 0,
             outcome: Outcome::Converged,
             inertia,
-        };
+        }
+    }
+
+    /// Inertia of the second derivative at the present minimum.
+    fn inertia(&mut self) -> Option<Inertia> {
+        let inertia = self.iterate.inertia();
         self.iterate.linearise();
         self.factorise();
-        solution
+        inertia
     }
 
     /// The steps of the unknowns and of the equalities' multipliers by which the minimum answers a change of its programme, to
@@ -278,25 +331,28 @@ where
         (&kkt.step, &kkt.multiplier_step)
     }
 
-    /// Length of the stride with which the next way begins, after one that was interrupted.
-    pub fn next_stride(&self) -> Option<f64> {
+    /// How the next way begins.
+    pub fn next_stride(&self) -> NextStride {
         self.next_stride
     }
 
-    /// Sets the length of the stride with which the next way begins.
-    pub fn set_next_stride(&mut self, stride: Option<f64>) {
+    /// Sets how the next way begins, to that of another follower at the same minimum.
+    pub fn set_next_stride(&mut self, stride: NextStride) {
         self.next_stride = stride;
+        self.factorise();
     }
 
     /// Makes the present minimum the one to return to.
     pub fn depart(&mut self) {
-        self.first.copy_from(&self.last);
+        self.first.0.copy_from(&self.last);
+        self.first.1 = self.next_stride.damping;
     }
 
     /// Returns to the minimum of the last departure; `change` sets the programme back.
     pub fn return_to_start(&mut self, change: impl FnOnce(&mut P)) {
         change(&mut self.iterate.program);
-        self.last.copy_from(&self.first);
+        self.last.copy_from(&self.first.0);
+        self.next_stride.damping = self.first.1;
         self.go_back();
     }
 
@@ -374,10 +430,13 @@ where
         (CORRECTIONS, false)
     }
 
-    /// Factorises at the present point; false where the second derivative is not positive on the tangent space.
+    /// Factorises at the present point; false where the damped second derivative is not positive on the tangent space.
     fn factorise(&mut self) -> bool {
         self.iterate.assemble();
-        self.iterate.kkt.factorise_damped(0.0).is_ok()
+        self.iterate
+            .kkt
+            .factorise_damped(self.next_stride.damping)
+            .is_ok()
     }
 
     /// Stores the present point as the last minimum.

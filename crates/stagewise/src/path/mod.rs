@@ -14,5 +14,5 @@ mod modal_load;
 pub use continuation::{Continuation, settle};
 pub use curve::{Curve, End, Event, Events, Pace, Station, Turn};
 pub use family::{Family, by_differences};
-pub use follow::{FollowSettings, Followed, Follower};
+pub use follow::{FollowSettings, Followed, Follower, NextStride};
 pub use modal_load::over_modal_load;

@@ -262,23 +262,15 @@ pub(in crate::equilibrium) fn is_slender(problem: &Problem) -> bool {
 
 /// The mesh of a programme graded anew for a shape of its: fine where ribs turn, and so far about these places that they may
 /// move by as much as the width.
+///
+/// Elements that are shorter there are not kept: where the error asks for them they are found again, and else each mesh would
+/// be finer than the one before.
 pub(in crate::equilibrium) fn mesh_about_ribs(
     problem: &Problem,
     program: &BeltProgram,
     point: &BeltPoint,
 ) -> Mesh {
-    let width = own_width(problem);
-    mesh_for_ribs(problem, program, point, width / PER_WIDTH, width)
-}
-
-/// A mesh whose elements are short where the ribs of a shape turn and within a reach of there, in U.
-fn mesh_for_ribs(
-    problem: &Problem,
-    program: &BeltProgram,
-    point: &BeltPoint,
-    short: f64,
-    reach: f64,
-) -> Mesh {
+    let reach = own_width(problem);
     let nodes = program.nodes();
     let turning = program.elements();
     let turning = turning.filter(|element| ribs_turn(point, *element));
@@ -287,14 +279,12 @@ fn mesh_for_ribs(
         let mut turning = turning.iter();
         turning.any(|[from, to]| from - nodes[k + 1] < reach && nodes[k] - to < reach)
     };
-    let elements = program.elements();
-    let lengths: Vec<f64> = elements
-        .map(
-            |(k, element)| match ribs_turn(point, (k, element)) || is_near(k) {
-                true => element.length.min(short),
-                false => element.length.max(LONGEST),
-            },
-        )
+    let lengths: Vec<f64> = program
+        .elements()
+        .map(|(k, element)| match is_near(k) {
+            true => reach / PER_WIDTH,
+            false => element.length.max(LONGEST),
+        })
         .collect();
     Mesh::of(problem, program).graded(problem, &lengths, &[])
 }

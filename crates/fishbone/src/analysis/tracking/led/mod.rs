@@ -1,6 +1,7 @@
 //! An equilibrium of any model of the strip, led by some of its supports.
 
 mod derivatives;
+mod eigenvalue;
 mod lead;
 mod mesh;
 mod regrasp;
@@ -97,7 +98,7 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
             smallest_jump: problem.snap_size(),
             jumps: false,
         };
-        Follower::new(program, settings, minimum).ok_or(NoTracker::Marginal)
+        Follower::new(program, settings, minimum).ok_or(NoTracker::NoMinimum)
     }
 
     /// As [`Tracker::moving`](super::Tracker::moving).

@@ -10,7 +10,7 @@ use crate::problem::program::{BeltPoint, BeltProgram};
 use nalgebra::SVector;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use stagewise::Stationary;
+use stagewise::{NextStride, Stationary};
 
 /// The data of a [`Led`], borrowed to be written or owned once read.
 #[derive(Serialize, Deserialize)]
@@ -20,7 +20,7 @@ struct Stored<B, P, A, M, O, S, L> {
     at: A,
     moving: M,
     poses: O,
-    next_stride: Option<f64>,
+    next_stride: NextStride,
     watched: f64,
     sound: S,
     flat: L,
