@@ -74,6 +74,18 @@ def moved(tracker: fb.Tracker, random: np.random.Generator) -> None:
 CALLS: list[Callable[[fb.Tracker, np.random.Generator], None]] = [pickled, solved, read, moved]
 
 
+def call_in_child(shared: fb.Tracker, random: np.random.Generator) -> None:
+    """Calls with the tracker of the parent, which a thread of the parent may be at work on, then with another one."""
+    assert np.isfinite(shared.position).all()
+    try:
+        moved(shared, random)
+    except RuntimeError as lost:
+        assert str(lost).startswith("lost: ")  # noqa: PT017 - no test of pytest
+    tracker = fb.Tracker(SCENARIO)
+    for call in CALLS:
+        call(tracker, random)
+
+
 class Stress:
     """The threads, and what they have done."""
 
@@ -107,9 +119,7 @@ class Stress:
         if child == 0:
             signal.setitimer(signal.ITIMER_REAL, 0.0)
             try:
-                tracker = fb.Tracker(SCENARIO)
-                for call in CALLS:
-                    call(tracker, random)
+                call_in_child(self.tracker, random)
                 os._exit(0)
             finally:
                 traceback.print_exc()

@@ -43,6 +43,27 @@ def test_the_part_that_is_still_held_keeps_its_shape_in_random_regrasps(seed):
 
 
 @pytest.mark.parametrize("energy", ["fishbone", "wunderlich"])
+def test_a_hold_near_the_end_that_is_let_go_is_no_snap(energy):
+    """Ribs beside it turn, which moves what is still held by less than a fifth of the width."""
+    for seed in range(10):
+        random = np.random.default_rng(seed)
+        tracker = example1(energy)
+        tracker.update(POSITION + random.uniform(-0.1, 0.1, 3), random.uniform(-0.4, 0.4, 3))
+        update = tracker.regrasp(hold=float(random.uniform(0.7, 0.98)), release="end")
+        assert (update.status, update.snapped) == ("converged", False)
+        assert update.jump < 0.02
+
+
+def test_a_hold_in_place_of_another_one_changes_nothing():
+    tracker = example1("wunderlich")
+    before = tracker.copy()
+    update = tracker.regrasp(hold="end", release="end")
+    assert (update.status, update.snapped) == ("converged", False)
+    assert update.jump < 1e-6
+    assert tracker.energy == pytest.approx(before.energy, rel=1e-9)
+
+
+@pytest.mark.parametrize("energy", ["fishbone", "wunderlich"])
 def test_a_hold_alone_changes_no_energy_and_bears_no_load(energy):
     tracker = example1(energy)
     energy, nodes, end = tracker.energy, len(np.unique(tracker.u)), tracker.reaction("end")

@@ -5,6 +5,7 @@ Each script runs in a process of its own, which is ended where it hangs.
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -165,6 +166,62 @@ print(len(seen))
 """
     )
     assert int(seen) == 8
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork on Windows")
+@pytest.mark.parametrize("call", ["tracker.copy()", "tracker.update([0.0, 0.5, 0.1])", "tracker.state()"])
+def test_a_child_made_by_fork_while_a_thread_moves_the_tracker_gets_an_error(call: str) -> None:
+    """Or the tracker, if no update was at work in the moment of the fork; it can read the shape before in any case."""
+    words = output(
+        f"""
+tracker = fb.Tracker(fb.load("scenarios/example1.toml"))
+
+def robot():
+    k = 0
+    while True:
+        k += 1
+        tracker.update([0.0, 0.5 + 0.02 * (k % 2), 0.1], [0.0, 0.0, 0.0])
+
+threading.Thread(target=robot, daemon=True).start()
+codes = []
+for _ in range(20):
+    child = os.fork()
+    if child == 0:
+        code = 3
+        try:
+            assert tracker.position.shape == tracker.bend.shape + (3,)
+            {call}
+            code = 0
+        except RuntimeError as error:
+            code = 1 if str(error).startswith("lost: another thread was at work") else 2
+        os._exit(code)
+    _, status = os.waitpid(child, 0)
+    codes.append(os.waitstatus_to_exitcode(status))
+print(sorted(set(codes)))
+os._exit(0)
+"""
+    )
+    assert set(json.loads(words)) <= {0, 1}
+    assert 1 in json.loads(words)
+
+
+def test_control_c_ends_the_first_call_that_makes_an_array() -> None:
+    """Nothing of NumPy is left to be found then, which would run the handler in the midst of the core."""
+    seen = output(
+        """
+tables = fb.load("scenarios/example1.toml").to_dict() | {"solver": {"elements": 2000}}
+belt = fb.solve(fb.Scenario.from_dict(tables))
+points = [[k / 20000, 0.01] for k in range(20000)]
+threading.Timer(0.2, signal.raise_signal, [signal.SIGINT]).start()
+start = time.monotonic()
+try:
+    while True:
+        belt.material_points(points)
+except KeyboardInterrupt:
+    print(time.monotonic() - start)
+"""
+    )
+    assert float(seen) < 0.2 + 0.5
 
 
 CALLS = {

@@ -306,6 +306,21 @@ def test_what_cannot_be_followed_is_refused() -> None:
             fb.Tracker(example(), supports=supports)
 
 
+def test_many_poses_of_more_nodes_than_memory_may_hold_are_refused() -> None:
+    tracker = fb.Tracker(example(elements=2000))
+    with pytest.raises(
+        fb.InvalidArgument, match=r"^positions: found 30000 of 2001 nodes each, allowed up to 5 million"
+    ):
+        tracker.update_many(np.tile(END, (30_000, 1)))
+
+
+def test_an_update_without_a_motion_needs_no_time() -> None:
+    tracker = fb.Tracker(example())
+    tracker.update([0.0, 0.52, 0.1])
+    update = tracker.update([0.0, 0.52, 0.1], max_time=1e-9)
+    assert (update.status, update.fraction, update.iterations) == ("converged", 1.0, 0)
+
+
 def test_an_update_has_the_reason_why_a_pose_was_not_reached() -> None:
     """A pose out of reach is proved to be; of another it is known only that nothing was found."""
     tracker = fb.Tracker(example("fishbone", elements=40))

@@ -82,6 +82,24 @@ def test_edges_move_as_the_material_that_is_there():
     assert np.abs(jacobian - tracker.jacobian())[inside].max() > 0.04
 
 
+@pytest.mark.parametrize("board", ["curved", "bent"])
+@pytest.mark.parametrize("side", ["minus", "plus"])
+def test_edges_of_arcs_and_beside_corners_move_with_their_ribs(board, side):
+    """Of the material at the end of each rib: a step moves it, and the rib of the node to other material."""
+    tracker, position, turn = led(board, "wunderlich", 256)
+    found = tracker.equilibrium()
+    edge, spine = getattr(found.edges, side), found.position
+    jacobian, of_spine = tracker.jacobian(v=side), tracker.jacobian()
+    width = found.scenario.to_dict()["belt"]["width"]
+    assert np.abs(np.linalg.norm(edge - spine, axis=1) - 0.5 * width).max() > 1e-4
+    for column in range(6):
+        # The line from the spine turns with the frame.
+        ends = [nudged(tracker, position, turn, column, sign * STEP).frame for sign in (1.0, -1.0)]
+        turns = np.einsum("nij,nkj->nik", (ends[0] - ends[1]) / (2.0 * STEP), tracker.frame)
+        moved = of_spine[:, :, column] + np.einsum("nij,nj->ni", turns, edge - spine)
+        np.testing.assert_allclose(jacobian[:, :, column], moved, atol=1e-3)
+
+
 def test_other_supports_have_derivatives_and_pins_none_by_rotation():
     tables = fb.load("scenarios/example1.toml").to_dict()
     tables["supports"].insert(1, {"at": 0.5, "position": [0.0, 0.25, 0.3]})
@@ -170,6 +188,7 @@ def test_a_taut_belt_has_no_derivatives():
             "support: found 0, which does not move",
         ),
         (lambda tracker: tracker.jacobian(v=float("nan")), fb.InvalidArgument, "v: found nan, allowed finite numbers"),
+        (lambda tracker: tracker.jacobian(v="left"), fb.InvalidArgument, 'v: found "left", allowed "minus", "plus" or'),
         (lambda tracker: tracker.jacobian(v=[1.0]), fb.InvalidArgument, r"v: found shape \(1,\), allowed \(\)"),
     ],
 )

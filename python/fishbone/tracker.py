@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
 from fishbone import _core
-from fishbone.equilibrium import Equilibrium, Reaction, solve
+from fishbone.equilibrium import MAX_POINTS, Edges, Equilibrium, Reaction, solve
 from fishbone.errors import InvalidArgument
 from fishbone.places import support_index
 from fishbone.pose import Pose, numbers_of, parts_of
@@ -175,9 +175,9 @@ class Tracker:
         the poses of some of them by their names; the others stay. All move together, straight to their poses and turned
         the shorter way round.
 
-        An update ends at the latest after `max_time`, but for the iteration that it is in, or after `max_iterations`;
-        then it is at a `fraction` of the way, and a further one goes on. With `max_iterations` alone it is the same on
-        every run.
+        An update ends after `max_time`, once the iteration or the estimate of the mesh that it is in has ended, which
+        takes milliseconds, or after `max_iterations`; then it is at a `fraction` of the way, and a further one goes on.
+        With `max_iterations` alone it is the same on every run.
 
         Shapes: (3,) each; a matrix (4, 4).
         Units: those of the scenario; rad; s.
@@ -212,7 +212,8 @@ class Tracker:
         Shapes: (m, 3) both; of k > 1 moving supports (m, k, 3), in the order in which the tracker was given them.
         Without rotations all are kept.
         Units: those of the scenario; rad.
-        Errors: those of `update`, before the first update.
+        Errors: those of `update`, before the first update; `InvalidArgument` where all shapes have more than 5 million
+        nodes.
         """
         moving = self._inner.moving
         shape = (None, 3) if len(moving) == 1 else (None, len(moving), 3)
@@ -225,20 +226,24 @@ class Tracker:
             turns = turned.tolist()
         to = [list(zip(moving, *poses, strict=True)) for poses in zip(rows.tolist(), turns, strict=True)]
         u = self.u
-        found, shapes, (force, moment) = self._inner.update_many(to, stop_on_snap)
+        if len(to) * len(u) > MAX_POINTS:
+            points = f"found {len(to)} of {len(u)} nodes each"
+            raise InvalidArgument(f"positions: {points}, allowed up to {MAX_POINTS // 10**6} million nodes in all")
+        found, (shapes, force, moment) = self._inner.update_many(to, stop_on_snap)
         updates = [Update(*update) for update in found]
         valid = sum(update.status == "converged" for update in updates)
         each = (len(updates), *shape[1:])
-        positions = np.reshape(shapes, (len(shapes), len(u), 3))
-        return Updates(updates, valid, u, positions, force.reshape(each), moment.reshape(each))
+        shapes = shapes.reshape(len(updates), len(u), 3)
+        return Updates(updates, valid, u, shapes, force.reshape(each), moment.reshape(each))
 
     def regrasp(self, *, hold: End | float | None = None, release: Place | None = None) -> Update:
         """Takes hold of the belt at a place, an end or an arc length, and lets another support go.
 
         The new support is a clamp that moves from then on, with the other supports that move. What supports still
-        hold between them keeps its shape; a part that none holds any more comes to rest from the shape that it has.
-        `jump` is the largest displacement of what is still held. Where no equilibrium is found the tracker stays as it
-        was.
+        hold between them keeps its shape, but for ribs near the new support, which are free to turn; a part that none
+        holds any more comes to rest from the shape that it has. `jump` is the largest displacement of what is still
+        held, and it has `snapped` if this is a fifth of the width or more. Where no equilibrium is found the tracker
+        stays as it was.
 
         Units: `hold` in those of the scenario.
         Errors: `InvalidArgument` where neither is given; `NoSupport`; `InvalidScenario` for supports that no scenario
@@ -290,19 +295,25 @@ class Tracker:
         force, moment = self._inner.reaction(self._index_of(support))
         return Reaction(np.array(force), np.array(moment))
 
-    def jacobian(self, support: Place | None = None, v: float = 0.0) -> Floats:
+    def jacobian(self, support: Place | None = None, v: float | Literal["minus", "plus"] = 0.0) -> Floats:
         """Derivatives of positions by the motion of a support, by default of the first that moves.
 
-        They are of the points of the board at v across on the ribs of the nodes: of the spine, of an edge at half the
-        width. The last axis is [translation, left world-axes rotation about the support point]; for components that
-        the support leaves free the derivatives are 0. No Newton step is taken.
+        They are of the points of the board at v across on the ribs of the nodes, or of the ribs' ends on an edge, named
+        as in `Equilibrium.edges`. The last axis is [translation, left world-axes rotation about the support point]; for
+        components that the support leaves free the derivatives are 0. No Newton step is taken.
 
         Shapes: (n, 3, 6).
         Units: `v` in those of the scenario.
         Errors: `NoSupport`; `NoSensitivity` where the belt has no slack or a part of it has stayed flat under load;
         `InvalidArgument` of points off the spine with the energy "shell".
         """
-        return self._inner.derivatives(self._index_or_first(support), float(numbers_of("v", v, ())))[0]
+        if isinstance(v, str):
+            if v not in Edges._fields:
+                raise InvalidArgument(f'v: found "{v}", allowed "minus", "plus" or a number')
+            across = self._inner.rib_ends()[Edges._fields.index(v)]
+        else:
+            across = np.full(len(self.u), numbers_of("v", v, ()))
+        return self._inner.derivatives(self._index_or_first(support), across.tolist())[0]
 
     def stiffness(self, support: Place | None = None) -> Floats:
         """Derivatives of a support's reaction by its motion, by default of the first that moves.
@@ -313,7 +324,7 @@ class Tracker:
         Shapes: (6, 6).
         Errors: as `jacobian`.
         """
-        return self._inner.derivatives(self._index_or_first(support), 0.0)[1]
+        return self._inner.derivatives(self._index_or_first(support), [0.0] * len(self.u))[1]
 
     def lowest_eigenvalue(self, support: Place | None = None) -> LowestEigenvalue:
         """The lowest eigenvalue of the second variation, and its gradient by the motion of a support that moves.

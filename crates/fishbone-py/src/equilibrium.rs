@@ -354,10 +354,15 @@ impl Equilibrium {
         py: Python<'py>,
         points: Vec<[f64; 2]>,
     ) -> PyResult<Option<[Points<'py>; 3]>> {
+        /// Points between looks for signals, a number.
+        const AT_ONCE: usize = 1000;
+        let parts: Vec<&[[f64; 2]]> = points.chunks(AT_ONCE).collect();
         let spine = &self.solved.spine;
-        let Some(found) = py.detach(|| surface::strain_at(spine, &points)) else {
+        let found = each(py, &parts, |points| surface::strain_at(spine, points))?;
+        let Some(found) = found.into_iter().collect::<Option<Vec<_>>>() else {
             return Ok(None);
         };
+        let found = found.concat();
         let tensors = |tensor: fn(&PointStrain) -> [f64; 3]| {
             let rows: Vec<Vector3<f64>> = found.iter().map(|at| tensor(at).into()).collect();
             array::points(py, &rows)
@@ -448,26 +453,24 @@ impl Equilibrium {
     /// The surface's points of points of the flat board; NaN off the board.
     ///
     /// Shapes: (m, 2) to (m, 3).
-    fn material_points<'py>(&self, py: Python<'py>, flat: Vec<[f64; 2]>) -> Points<'py> {
+    /// Errors: those that a signal handler raises.
+    fn material_points<'py>(&self, py: Python<'py>, flat: Vec<[f64; 2]>) -> PyResult<Points<'py>> {
         let off_board = Vector3::repeat(f64::NAN);
-        let point = |[y, z]: [f64; 2]| surface::material_point(&self.solved.spine, y, z);
-        let points: Vec<_> = flat
-            .into_iter()
-            .map(|at| point(at).unwrap_or(off_board))
-            .collect();
-        array::points(py, &points)
+        let spine = &self.solved.spine;
+        let point = |[y, z]: &[f64; 2]| surface::material_point(spine, *y, *z);
+        let points = each(py, &flat, |at| point(at).unwrap_or(off_board))?;
+        Ok(array::points(py, &points))
     }
 
     /// Arc lengths of the feet of the ribs through points of the flat board; NaN off the board.
     ///
     /// Shapes: (m, 2) to (m,).
-    fn rib_feet<'py>(&self, py: Python<'py>, flat: Vec<[f64; 2]>) -> Scalars<'py> {
-        let foot = |[y, z]: [f64; 2]| surface::rib_foot(&self.solved.spine, y, z);
-        let feet: Vec<_> = flat
-            .into_iter()
-            .map(|at| foot(at).unwrap_or(f64::NAN))
-            .collect();
-        feet.into_pyarray(py)
+    /// Errors: those that a signal handler raises.
+    fn rib_feet<'py>(&self, py: Python<'py>, flat: Vec<[f64; 2]>) -> PyResult<Scalars<'py>> {
+        let spine = &self.solved.spine;
+        let foot = |[y, z]: &[f64; 2]| surface::rib_foot(spine, *y, *z);
+        let feet = each(py, &flat, |at| foot(at).unwrap_or(f64::NAN))?;
+        Ok(feet.into_pyarray(py))
     }
 
     /// (from, to), the arc lengths of the ends of every stiffened stretch.
@@ -584,4 +587,20 @@ fn polyline(edge: &[Curve], tolerance: f64) -> Vec<Vector2<f64>> {
         .iter()
         .flat_map(|curve| curve.points(tolerance).into_iter().skip(1));
     first.into_iter().chain(others).collect()
+}
+
+/// The values of a function, with the GIL released; the signals are asked between them.
+///
+/// Errors: those that a signal handler raises.
+fn each<A: Sync, V: Send>(
+    py: Python<'_>,
+    of: &[A],
+    function: impl Fn(&A) -> V + Send,
+) -> PyResult<Vec<V>> {
+    let mut signals = Signals::new();
+    let values = py.detach(|| {
+        let going = of.iter().take_while(|_| signals.proceed().is_continue());
+        going.map(function).collect()
+    });
+    signals.raised.map_or(Ok(values), Err)
 }

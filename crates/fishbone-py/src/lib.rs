@@ -20,6 +20,15 @@ mod tracker;
 /// The compiled core of fishbone; `fishbone` itself is its public face.
 #[pyo3::pymodule]
 mod _core {
+    use pyo3::prelude::*;
+
+    /// NumPy's functions are found here: at the first array this would run Python code, and with it handlers of signals.
+    #[pymodule_init]
+    fn find_numpy(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        numpy::dtype::<f64>(module.py());
+        Ok(())
+    }
+
     #[pymodule_export]
     use crate::batch::solve_many;
     #[pymodule_export]

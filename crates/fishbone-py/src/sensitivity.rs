@@ -38,7 +38,7 @@ impl Sensitivity {
         product: impl FnOnce(&mut sensitivity::Sensitivity) -> Result<T, NoSensitivity> + Send,
     ) -> PyResult<T> {
         self.inner
-            .with(py, |sensitivity, _| product(sensitivity))?
+            .with(py, |sensitivity, _| product(sensitivity), |_| ())?
             .map_err(|error| raised(py, &error))
     }
 }

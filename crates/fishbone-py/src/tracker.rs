@@ -6,6 +6,7 @@ use crate::errors::exception::InvalidArgument;
 use crate::errors::{invalid_scenario, raised};
 use crate::exclusive::Exclusive;
 use crate::scenario::Scenario;
+use crate::signals::Signals;
 use crate::stored::{self, Reduced};
 use fishbone::analysis::tracking as core;
 use fishbone::equilibrium::Status;
@@ -23,7 +24,7 @@ use std::time::Duration;
 #[pyclass(frozen, module = "fishbone._core")]
 pub(crate) struct Tracker {
     moving: Exclusive<core::Tracker>,
-    /// Locked to be copied alone, never while the GIL is waited for.
+    /// Locked to be copied alone, and with the GIL held, so that no child made by `fork` finds it locked.
     shown: Mutex<Shown>,
 }
 
@@ -112,6 +113,18 @@ impl Tracker {
         part(&self.shown())
     }
 
+    /// Works on the tracker with the GIL released, and shows its shape then.
+    ///
+    /// Errors: as [`Exclusive::with`].
+    fn with<R: Send>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&mut core::Tracker, &mut Signals) -> R + Send,
+    ) -> PyResult<R> {
+        self.moving
+            .with(py, work, |tracker| self.shown().copy(tracker))
+    }
+
     fn of(tracker: core::Tracker) -> Self {
         let mut shown = Shown::default();
         shown.copy(&tracker);
@@ -150,7 +163,7 @@ impl Tracker {
     ///
     /// Errors: as `equilibrium`.
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        let bytes = self.moving.with(py, |tracker, _| tracker.to_bytes())?;
+        let bytes = self.with(py, |tracker, _| tracker.to_bytes())?;
         Ok(PyBytes::new(py, &bytes.map_err(stored::refused)?))
     }
 
@@ -158,7 +171,7 @@ impl Tracker {
     ///
     /// Errors: as `equilibrium`.
     fn copy(&self, py: Python<'_>) -> PyResult<Self> {
-        self.moving.with(py, |tracker, _| Self::of(tracker.clone()))
+        self.with(py, |tracker, _| Self::of(tracker.clone()))
     }
 
     /// What `pickle` and `copy` make it anew of.
@@ -183,12 +196,11 @@ impl Tracker {
         let time =
             max_time.map(|seconds| Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX));
         let mut budget = core::Budget::new(time, max_iterations);
-        let update = self.moving.with(py, |tracker, signals| {
+        let update = self.with(py, |tracker, signals| {
             let update = tracker.update(&goals(&to), &mut || {
                 signals.proceed()?;
                 budget.proceed()
             });
-            self.shown().copy(tracker);
             let crosses_itself = check_crossing
                 .then(|| surface::crosses_itself(&tracker.equilibrium().spine).is_some());
             update.map(|update| updated(update, crosses_itself))
@@ -196,20 +208,19 @@ impl Tracker {
         update.map_err(|refused| invalid_scenario(py, &refused, None))
     }
 
-    /// As `update`, goals after goals, with the reactions of the moving supports and the positions at the nodes of the first
-    /// shape; ends after an update that has not converged and, if asked to, after a snap.
+    /// As `update`, goals after goals, with the positions at the nodes of the first shape and the reactions of the moving supports;
+    /// ends after an update that has not converged and, if asked to, after a snap.
     ///
-    /// Shapes: one shape (n, 3) an update; forces and moments (k, 3) an update, of k moving supports.
+    /// Shapes: positions (n, 3) an update, forces and moments (k, 3) an update, of k moving supports; one after the other.
     /// Errors: as `update`; of an invalid pose, before the first update.
     fn update_many<'py>(
         &self,
         py: Python<'py>,
         to: Vec<Vec<Goal>>,
         stop_on_snap: bool,
-    ) -> PyResult<(Vec<Updated>, Vec<Points<'py>>, [Points<'py>; 2])> {
-        let mut shapes = Vec::new();
-        let mut wrenches = Vec::new();
-        let updates = self.moving.with(py, |tracker, signals| {
+    ) -> PyResult<(Vec<Updated>, [Points<'py>; 3])> {
+        let [mut positions, mut forces, mut moments] = [const { Vec::new() }; 3];
+        let updates = self.with(py, |tracker, signals| {
             let to: Vec<_> = to.iter().map(|row| goals(row)).collect();
             for goals in &to {
                 tracker.check(goals)?;
@@ -220,24 +231,26 @@ impl Tracker {
                 let update = tracker.update(goals, &mut || signals.proceed())?;
                 let ends = update.status != Status::Converged || stop_on_snap && update.snapped;
                 updates.push(update);
-                shapes.push(tracker.positions_at(&nodes));
-                let moving = tracker.moving().iter();
-                wrenches.extend(moving.map(|support| tracker.reaction(*support)));
+                positions.extend(tracker.positions_at(&nodes));
+                for wrench in tracker
+                    .moving()
+                    .iter()
+                    .map(|support| tracker.reaction(*support))
+                {
+                    forces.push(wrench.force);
+                    moments.push(wrench.moment);
+                }
                 if ends || signals.proceed().is_break() {
                     break;
                 }
             }
-            self.shown().copy(tracker);
             Ok(updates)
         })?;
         let updates: Vec<core::Update> =
             updates.map_err(|refused| invalid_scenario(py, &refused, None))?;
-        let shapes = shapes.iter().map(|shape| array::points(py, shape));
-        let forces: Vec<_> = wrenches.iter().map(|wrench| wrench.force).collect();
-        let moments: Vec<_> = wrenches.iter().map(|wrench| wrench.moment).collect();
-        let wrenches = [forces, moments].map(|parts| array::points(py, &parts));
         let updates = updates.into_iter().map(|update| updated(update, None));
-        Ok((updates.collect(), shapes.collect(), wrenches))
+        let arrays = [positions, forces, moments].map(|rows| array::points(py, &rows));
+        Ok((updates.collect(), arrays))
     }
 
     /// Takes hold of the belt at an arc length and lets a support go, which is named by its place before; as `update`.
@@ -249,16 +262,27 @@ impl Tracker {
         hold: Option<f64>,
         release: Option<usize>,
     ) -> PyResult<Updated> {
-        let update = self.moving.with(py, |tracker, signals| {
-            let update = tracker.regrasp(hold, release, &mut || signals.proceed());
-            self.shown().copy(tracker);
-            update
+        let update = self.with(py, |tracker, signals| {
+            tracker.regrasp(hold, release, &mut || signals.proceed())
         })?;
         let update = update.map_err(|refused| invalid_scenario(py, &refused, None))?;
         Ok(updated(update, None))
     }
 
-    /// Derivatives by the motion of a support, of the points at v across on the ribs of the nodes, and of its reaction.
+    /// Places v across of the ends of the ribs of the nodes, on the −ζ and on the +ζ side.
+    ///
+    /// Shapes: (n,) each.
+    /// Errors: as `equilibrium`.
+    fn rib_ends<'py>(&self, py: Python<'py>) -> PyResult<[Scalars<'py>; 2]> {
+        let ribs = self.with(py, |tracker, _| surface::ribs(&tracker.equilibrium().spine))?;
+        let ends = |of: fn(&surface::Rib) -> f64| {
+            let ends: Vec<f64> = ribs.iter().map(of).collect();
+            ends.into_pyarray(py)
+        };
+        Ok([ends(|rib| rib.v_minus), ends(|rib| rib.v_plus)])
+    }
+
+    /// Derivatives by the motion of a support, of points at v across on the ribs of the nodes, one a node, and of its reaction.
     ///
     /// Shapes: (n, 3, 6), (6, 6).
     /// Errors: `NoSensitivity`; `InvalidArgument` of points off the spine of a strip of finite thickness; as `equilibrium`.
@@ -266,18 +290,22 @@ impl Tracker {
         &self,
         py: Python<'py>,
         support: usize,
-        across: f64,
+        across: Vec<f64>,
     ) -> PyResult<(Grid<'py>, Points<'py>)> {
-        let (found, ribs) = self.moving.with(py, |tracker, _| {
+        let (found, ribs) = self.with(py, |tracker, _| {
             (tracker.derivatives(support), tracker.ribs())
         })?;
         let found = found.map_err(|error| raised(py, &error))?;
         let points = match ribs {
-            _ if across == 0.0 => found.position,
-            Some(ribs) => found.at(&ribs.iter().map(|rib| across * rib).collect::<Vec<_>>()),
+            _ if across.iter().all(|v| *v == 0.0) => found.position,
+            Some(ribs) => {
+                let lines = ribs.iter().zip(&across).map(|(rib, v)| *v * rib);
+                found.at(&lines.collect::<Vec<_>>())
+            }
             None => {
+                let farthest = across.iter().fold(0.0f64, |most, v| most.max(v.abs()));
                 return Err(InvalidArgument::new_err(format!(
-                    "v: found {across} with energy = \"shell\", allowed 0: its ribs are not straight"
+                    "v: found {farthest} with energy = \"shell\", allowed 0: its ribs are not straight"
                 )));
             }
         };
@@ -296,7 +324,7 @@ impl Tracker {
         py: Python<'py>,
         support: usize,
     ) -> PyResult<(f64, Scalars<'py>)> {
-        let found = self.moving.with(py, |tracker, signals| {
+        let found = self.with(py, |tracker, signals| {
             if !tracker.moving().contains(&support) {
                 return None;
             }
@@ -316,7 +344,7 @@ impl Tracker {
     ///
     /// Errors: as `update`, but for the pose.
     fn equilibrium(&self, py: Python<'_>) -> PyResult<(Scenario, Equilibrium)> {
-        self.moving.with(py, |tracker, _| {
+        self.with(py, |tracker, _| {
             let found = Equilibrium::of(|| tracker.equilibrium());
             (Scenario(found.core().problem().clone()), found)
         })
@@ -375,9 +403,7 @@ impl Tracker {
     ///
     /// Errors: as `equilibrium`.
     fn reaction(&self, py: Python<'_>, support: usize) -> PyResult<([f64; 3], [f64; 3])> {
-        let wrench = self
-            .moving
-            .with(py, |tracker, _| tracker.reaction(support))?;
+        let wrench = self.with(py, |tracker, _| tracker.reaction(support))?;
         Ok((array::row(&wrench.force), array::row(&wrench.moment)))
     }
 }

@@ -25,6 +25,10 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
     ) -> Status {
         /// Length of a way without motion, in U and rad.
         const NOWHERE: f64 = 1e-12;
+        if way.length() <= NOWHERE {
+            self.stand_at(1.0, way);
+            return Status::Converged;
+        }
         let Some([from, to]) = self.beside_flat(way) else {
             return self.lead_along(way, 1.0, proceed);
         };

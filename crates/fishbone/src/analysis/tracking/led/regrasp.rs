@@ -35,10 +35,13 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
             });
         };
         *self = taken;
+        /// Displacement of what is still held from which it has snapped, in V: beside a new hold ribs turn, which moves it by
+        /// less.
+        const SNAPPED: f64 = 0.2;
         let jump = self.displacement_between_supports(&before);
         Ok(Update {
             fraction: 1.0,
-            snapped: jump >= self.problem.snap_size() * self.units().length,
+            snapped: jump >= SNAPPED * self.problem.belt().width,
             jump,
             released: energy - self.energy(),
             ..self.report(Status::Converged, iterations)
@@ -54,6 +57,7 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
         let problem = self.present_problem();
         let mut supports = problem.scenario().supports.clone();
         let mut moving = self.moving.clone();
+        let let_go = release.and_then(|release| supports.get(release).cloned());
         if let Some(release) = release {
             if release >= supports.len() {
                 return Err(ScenarioError::invalid(
@@ -71,7 +75,9 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
         if let Some(u) = hold {
             let length = self.units().length;
             let place = supports.partition_point(|support| support.at.arc_length(length) < u);
-            supports.insert(place, self.holding(u));
+            let let_go = let_go.filter(|support| support.at.arc_length(length) == u);
+            let square = let_go.is_some_and(|support| problem.scenario().is_square_rib(&support));
+            supports.insert(place, self.holding(u, square));
             for support in moving.iter_mut().filter(|support| **support >= place) {
                 *support += 1;
             }
@@ -81,13 +87,13 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
         Ok((problem.about(self.problem.origin()), moving))
     }
 
-    /// A support that holds the belt at an arc length where it is.
-    fn holding(&mut self, u: f64) -> SupportSpec {
+    /// A support that holds the belt at an arc length where it is, and its rib square to the spine or not at all.
+    fn holding(&mut self, u: f64, square: bool) -> SupportSpec {
         let pose = self.present(D::of_solution_on_mesh).spine.at(u).pose;
         let mut held = SupportSpec::new(Place::ArcLength(u));
         held.position = Some([0, 1, 2].map(|i| Component::Held(pose.position[i])));
         held.rotation = Some(log(&pose.frame).into());
-        held.square_rib = Some(false);
+        held.square_rib = Some(square);
         held
     }
 
