@@ -128,6 +128,8 @@ def parts_of(name: str, pose: Any) -> tuple[list[float], list[float] | None]:  #
 
 def _is_position(pose: Any) -> bool:  # noqa: ANN401 - whatever a caller brings
     try:
+        if isinstance(pose, list | tuple):  # without an array, which warns of masked entries
+            return len(pose) == 3 and not any(map(np.ndim, pose))  # noqa: PLR2004 - a vector
         return bool(np.shape(pose) == (3,))
     except ValueError:  # of rows of several lengths
         return False

@@ -120,15 +120,15 @@ def sweep(  # noqa: PLR0913 - keywords all but three
 
     Every point is solved by itself, as `solve` does, so that a row depends on nothing but its point. Until the table is
     finished its parts are in the folder `path.parts`. A call with the same arguments goes on from there, or solves
-    nothing where the table is finished.
+    nothing where the table is finished. Parts that are not whole are solved again.
 
     Processes are started for the cores of this machine, unless `scheduler` is the address of a Dask scheduler, such as
     "tcp://host:8786". As always with processes, a script calls this under `if __name__ == "__main__":`.
     `progress(solved, all)` is called from the calling thread, for the points that are solved by this call.
 
-    Errors: `NoPath` where the scenario has no such number; `InvalidArgument` for other invalid arguments, and where
-    `path` holds another sweep; `MissingPackage`; `FishboneError` where the workers are lost; `OSError`; any error that
-    `progress` raises.
+    Errors: `NoPath` where the scenario has no such number; `InvalidArgument` for other invalid arguments, where `path`
+    holds another sweep, and where another process is at work on it; `MissingPackage`; `FishboneError` where the workers
+    are lost, or a part; `OSError`; any error that `progress` raises.
     """
     target = Path(path)
     obstacle = check_table(target)
