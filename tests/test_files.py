@@ -126,6 +126,18 @@ def test_threads_that_write_one_file_leave_a_whole_one_at_all_times():
     assert names() == ["a.json", "b.json"]
 
 
+def test_content_is_on_the_disk_before_a_file_takes_its_place(monkeypatch):
+    steps = []
+    fsync, replace = os.fsync, Path.replace
+    monkeypatch.setattr(files.os, "fsync", lambda file: (steps.append(os.fstat(file).st_size), fsync(file)))
+    monkeypatch.setattr(Path, "replace", lambda draft, to: (steps.append(to.name), replace(draft, to)))
+    files.write_all({Path("b.json"): b"three", Path("c.json"): b"four"})
+    with files.whole(Path("d.json")) as draft:
+        draft.write_bytes(b"x" * 100)
+    assert steps == [5, 4, "b.json", "c.json", 100, "d.json"]
+    assert names() == ["a.json", "b.json", "c.json", "d.json"]
+
+
 @pytest.mark.parametrize("mode", [0o600, 0o640, 0o664, 0o755])
 def test_a_file_keeps_its_mode(mode):
     path = Path("b.json")

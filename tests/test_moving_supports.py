@@ -133,9 +133,22 @@ def test_a_tracker_reports_that_its_belt_crosses_itself_when_it_is_asked():
     tracker = fb.Tracker(held(START, END))
     assert tracker.update(END["position"]).crosses_itself is None
     assert tracker.update(END["position"], check_crossing=True).crosses_itself is False
-    loop = fb.Tracker(held(START, {"at": "end", "position": [0.0, -0.4, 0.0], "rotation": [0.0, 0.0, 0.0]}))
-    crossed = loop.update([0.0, -0.41, 0.0], check_crossing=True)
-    assert crossed.crosses_itself == (loop.equilibrium().crosses_itself is not None)
+
+
+def test_a_loop_crosses_itself_until_its_end_is_more_than_the_width_aside():
+    tables = fb.load("scenarios/planar.toml").to_dict() | {"solver": {"elements": ELEMENTS}}
+    scenario = fb.Scenario.from_dict(tables)
+    nodes = len(fb.solve(scenario).u)
+    loop = fb.Tracker(fb.solve(scenario, start=(np.full(nodes, 2.0 * np.pi), np.zeros(nodes))))
+    assert loop.update([0.0, 0.61, 0.0], check_crossing=True).crosses_itself is True
+    first, second = loop.equilibrium().crosses_itself
+    assert second - first > 0.3
+    points = [[np.interp(u, loop.u, loop.position[:, axis]) for axis in range(3)] for u in (first, second)]
+    np.testing.assert_allclose(*points, atol=1.0 / ELEMENTS)
+    width = tables["belt"]["width"]
+    for aside, crosses in [(0.2 * width, True), (2.0 * width, False), (0.2 * width, True)]:
+        assert loop.update([0.0, 0.61, aside], check_crossing=True).crosses_itself is crosses
+        assert (loop.equilibrium().crosses_itself is not None) is crosses
 
 
 def test_a_belt_that_is_pulled_straight_is_taut_and_its_reactions_are_not_a_number():

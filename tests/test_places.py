@@ -28,7 +28,9 @@ def test_a_whole_number_that_may_mean_two_supports_is_refused(name):
         support_index(name, PLACES, 4.0)
 
 
-@pytest.mark.parametrize("name", ["middle", 7, 7.0, -5, 0.5, float("nan"), float("inf")])
+@pytest.mark.parametrize(
+    "name", ["middle", 7, 7.0, -5, 0.5, float("nan"), float("inf"), None, ("end",), b"1", 1j, 10**400]
+)
 def test_a_support_that_does_not_exist_is_refused(name):
     with pytest.raises(fb.NoSupport, match=r"found supports at u = \[0\.0, 2\.0, 3\.0, 4\.0\]") as raised:
         support_index(name, PLACES, 4.0)

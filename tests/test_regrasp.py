@@ -117,7 +117,15 @@ def test_a_regrasp_on_a_state_and_a_copy_is_the_same():
     [
         ({}, fb.InvalidArgument, "regrasp: found neither a hold nor a release"),
         ({"hold": 1.5}, fb.InvalidScenario, r"supports\[2\]\.at: found 1\.5"),
-        ({"hold": float("nan")}, fb.InvalidScenario, r"supports\[0\]\.at: found nan"),
+        ({"hold": float("nan")}, fb.InvalidArgument, "hold: found nan, allowed finite numbers"),
+        ({"hold": "middle"}, fb.InvalidArgument, 'hold: found \'middle\', allowed "start", "end" or an arc length'),
+        ({"hold": (0.3, 0.5)}, fb.InvalidArgument, r"hold: found shape \(2,\)"),
+        ({"hold": b"0.5"}, fb.InvalidArgument, "hold: found b'0.5', allowed a number"),
+        (
+            {"release": "end"},
+            fb.InvalidArgument,
+            "release: found 'end', the only support that moves, allowed with a hold",
+        ),
         ({"hold": "end"}, fb.InvalidScenario, r"supports\[\d\]\.at: found"),
         ({"release": 0.3}, fb.NoSupport, "support 0.3: found supports at"),
     ],
@@ -128,3 +136,11 @@ def test_a_regrasp_that_cannot_be_is_refused_and_changes_nothing(regrasp, kind, 
     with pytest.raises(kind, match=words):
         tracker.regrasp(**regrasp)
     assert tracker.state() == state
+
+
+def test_a_support_is_let_go_without_a_hold_where_another_one_moves():
+    tracker = fb.Tracker(fb.load("scenarios/example1.toml"), supports=["start", "end"])
+    assert tracker.regrasp(release="end").status == "converged"
+    assert tracker.stiffness().shape == (6, 6)
+    with pytest.raises(fb.InvalidArgument, match="release: found 0, the only support that moves"):
+        tracker.regrasp(release=0)

@@ -5,11 +5,13 @@ One cluster of two processes serves most tests, by its address; a few start proc
 
 from __future__ import annotations
 
+import errno
 import importlib
 import itertools
 import json
 import math
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -20,20 +22,24 @@ import dask
 import distributed
 import numpy as np
 import psutil
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
 import fishbone as fb
 from conftest import ROOT
 from fishbone import cli, plot, progress
-from fishbone.sweep import workers
+from fishbone.sweep import lock, workers
+from fishbone.sweep import parts as table_parts
 from fishbone.sweep.limit import limit_of
 from fishbone.sweep.points import MAX_POINTS, number_of, points_of
-from fishbone.sweep.rows import ALONG, LEFT_OUT, UNBENT, flatten, solve_part
+from fishbone.sweep.rows import ALONG, LEFT_OUT, UNBENT, WORDS, flatten, solve_part
 
 Y, Z = "supports[1].position[1]", "supports[1].position[2]"
 GRID = {Y: (0.4, 1.2, 5), Z: (0.0, 0.2, 4)}
 """Twenty points, of which seven are out of reach."""
+HERE = {"version": fb.__version__, "origin": "a digest"}
+"""The version and the sweep of a part."""
 PATIENCE = 100.0
 """Time after which a process is taken to hang [s]."""
 
@@ -108,6 +114,18 @@ def rows_of(path):
     return pq.ParquetFile(path).read().to_pylist()
 
 
+def interrupted(belt, path, scheduler, ranges=GRID, share=0.4):
+    """A sweep that ends early; the folder of its parts."""
+
+    def stop(solved, planned):
+        if solved >= share * planned:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        fb.sweep(belt, path, ranges, scheduler=scheduler, progress=stop)
+    return path.with_name(f"{path.name}.parts")
+
+
 def spawned():
     """The processes of clusters that this one has started."""
 
@@ -162,10 +180,17 @@ def test_the_seed_determines_what_is_drawn(belt):
         ({"supports[-1].position[1]": (0.1, 0.2, 3)}, {}, "found nothing"),
         ({Y: (0.1, 0.2)}, {}, "found 0.1:0.2, allowed start:stop:n"),
         ({Y: (0.1, 0.2, 3)}, {"sample": 5}, "found 0.1:0.2:3, allowed start:stop:n in a grid, start:stop in a sample"),
-        ({Y: (0.1, float("inf"), 3)}, {}, "found 0.1:inf:3"),
+        ({Y: (0.1, float("inf"), 3)}, {}, "found inf, allowed finite numbers"),
         ({Y: (0.1, 0.2, 2.5)}, {}, "found 2.5 values"),
         ({Y: (0.1, 0.2, 0)}, {}, "found 0 values"),
         ({Y: "abc"}, {}, "found 'abc', allowed numbers"),
+        ({Y: ("0.1", "0.2", "3")}, {}, "found ('0.1', '0.2', '3'), allowed numbers"),
+        ({Y: (-1e308, 1e308, 3)}, {}, "found -1e+308:1e+308:3, allowed numbers up to 1e+300"),
+        ([Y], {}, "ranges: found ['supports[1].position[1]'], allowed numbers by field"),
+        ({1: (0.1, 0.2, 3)}, {}, "ranges: found {1: (0.1, 0.2, 3)}, allowed numbers by field"),
+        ({}, {"tolerances": [(Y, 0.1)], "sample": 5}, "tolerances: found [('supports[1].position[1]', 0.1)], allowed"),
+        ({}, {"tolerances": {Z: "0.1"}, "sample": 5}, "supports[1].position[2]: found '0.1', allowed a number"),
+        ({}, {"tolerances": {Z: 1e308}, "sample": 5}, "found the tolerance 1e+308, allowed a positive number up to"),
         ({Y: (0.1, 0.2, 3)}, {"tolerances": {Z: 0.1}}, "allowed with a sample"),
         ({Y: (0.1, 0.2)}, {"tolerances": {Y: 0.1}, "sample": 5}, "found twice"),
         ({Y: (0.1, 0.2, 3), "supports.1.position.1": (0.1, 0.2, 3)}, {}, "found twice"),
@@ -218,7 +243,7 @@ def test_rows_do_not_depend_on_the_division_into_parts(belt, tmp_path):
         found = []
         for first, last in itertools.pairwise(bounds):
             number, content = solve_part(
-                belt.to_dict(), numbers, first, points.values(first, last), shapes=False, version=fb.__version__
+                belt.to_dict(), numbers, first, points.values(first, last), shapes=False, **HERE
             )
             assert number == first
             (tmp_path / "part.parquet").write_bytes(content)
@@ -277,13 +302,7 @@ def test_the_table_is_the_same_where_a_worker_is_lost_and_a_second_start_solves_
 
 
 def test_an_interrupted_sweep_goes_on_where_it_ended(belt, swept, scheduler, tmp_path):
-    def stop(solved, planned):
-        if solved >= 0.4 * planned:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        fb.sweep(belt, tmp_path / "a.parquet", GRID, scheduler=scheduler, progress=stop)
-    parts = list((tmp_path / "a.parquet.parts").glob("*.parquet"))
+    parts = list(interrupted(belt, tmp_path / "a.parquet", scheduler).glob("*.parquet"))
     assert not (tmp_path / "a.parquet").exists()
     assert sum(len(rows_of(part)) for part in parts) == 8
     seen = []
@@ -293,6 +312,170 @@ def test_an_interrupted_sweep_goes_on_where_it_ended(belt, swept, scheduler, tmp
     assert found.solved == 12
     assert seen == [(solved, 12) for solved in range(1, 13)]
     assert found.path.read_bytes() == swept.path.read_bytes()
+
+
+def with_a_changed_byte(content, column=0):
+    """A table in which a byte of the pages of a column is another one."""
+    pages = pq.read_metadata(pa.BufferReader(content)).row_group(0).column(column)
+    place = pages.data_page_offset + pages.total_compressed_size // 2
+    return content[:place] + bytes([content[place] ^ 0xFF]) + content[place + 1 :]
+
+
+def with_another_number(content):
+    """A part in which the energy is another one, written by someone else."""
+    table = pq.read_table(pa.BufferReader(content))
+    columns = {name: table[name].to_pylist() for name in table.column_names} | {"energy": [0.0]}
+    sink = pa.BufferOutputStream()
+    pq.write_table(pa.table(columns), sink)
+    return sink.getvalue().to_pybytes()
+
+
+@pytest.mark.parametrize(
+    "harm",
+    [
+        lambda _: b"",
+        lambda content: content[:-100],
+        lambda content: content[100:],
+        lambda _: b"PAR1 no parquet PAR1",
+        with_a_changed_byte,
+        with_another_number,
+    ],
+    ids=["empty", "truncated", "beheaded", "garbage", "changed", "rewritten"],
+)
+def test_a_part_that_is_not_whole_is_solved_again(belt, swept, scheduler, tmp_path, harm):
+    path = tmp_path / "a.parquet"
+    parts = sorted(interrupted(belt, path, scheduler).glob("*.parquet"))
+    parts[2].write_bytes(harm(parts[2].read_bytes()))
+    found = fb.sweep(belt, path, GRID, scheduler=scheduler)
+    assert found.solved == 20 - len(parts) + 1
+    assert found.path.read_bytes() == swept.path.read_bytes()
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_part_of_other_points_or_of_another_sweep_is_solved_again(belt, swept, scheduler, tmp_path):
+    path = tmp_path / "a.parquet"
+    parts = sorted(interrupted(belt, path, scheduler).glob("*.parquet"))
+    shutil.copy(parts[0], parts[1])
+    other = interrupted(at(belt, [0.6, 0.1]), tmp_path / "b.parquet", scheduler, share=1.0)
+    shutil.copy(other / parts[2].name, parts[2])
+    found = fb.sweep(belt, path, GRID, scheduler=scheduler)
+    assert found.solved == 20 - len(parts) + 2
+    assert found.path.read_bytes() == swept.path.read_bytes()
+
+
+def test_files_among_the_parts_are_not_merged_and_not_removed(belt, swept, scheduler, tmp_path):
+    path = tmp_path / "a.parquet"
+    parts = interrupted(belt, path, scheduler)
+    stray = parts / "00000099.parquet"
+    shutil.copy(parts / "manifest.json", parts / "notes.txt")
+    shutil.copy(next(parts.glob("*.parquet")), stray)
+    (parts / ".left.part").mkdir()  # a draft of a process that was killed
+    assert fb.sweep(belt, path, GRID, scheduler=scheduler).path.read_bytes() == swept.path.read_bytes()
+    assert sorted(file.name for file in parts.iterdir()) == [stray.name, "notes.txt"]
+
+
+@pytest.mark.parametrize("manifest", [b"", b"[]", b"{", b"\xff", None])
+def test_a_manifest_that_is_lost_is_written_again_where_all_parts_are_of_the_sweep(
+    belt, swept, scheduler, tmp_path, manifest
+):
+    path = tmp_path / "a.parquet"
+    parts = interrupted(belt, path, scheduler)
+    count = len(list(parts.glob("*.parquet")))
+    (parts / "manifest.json").unlink()
+    if manifest is not None:
+        (parts / "manifest.json").write_bytes(manifest)
+    found = fb.sweep(belt, path, GRID, scheduler=scheduler)
+    assert (found.solved, found.path.read_bytes()) == (20 - count, swept.path.read_bytes())
+
+
+def test_parts_of_an_unknown_sweep_are_refused_and_stay(belt, scheduler, tmp_path):
+    path = tmp_path / "a.parquet"
+    parts = interrupted(belt, path, scheduler)
+    (parts / "manifest.json").write_bytes(b"")
+    before = {file: file.read_bytes() for file in parts.iterdir()}
+    with pytest.raises(fb.InvalidArgument, match=r"found parts of an unknown sweep, .*: remove the folder") as refused:
+        fb.sweep(at(belt, [0.6, 0.1]), path, GRID, scheduler=scheduler)
+    assert "\n" not in str(refused.value)
+    assert {file: file.read_bytes() for file in parts.iterdir()} == before
+
+
+def test_a_part_that_is_lost_before_the_end_is_named_and_a_second_start_goes_on(belt, swept, scheduler, tmp_path):
+    path = tmp_path / "a.parquet"
+
+    def lose(solved, planned):
+        if solved == planned:
+            (tmp_path / "a.parquet.parts" / "00000003.parquet").unlink()
+
+    with pytest.raises(fb.FishboneError, match=r"00000003.parquet: found no whole part any more; repeat the sweep"):
+        fb.sweep(belt, path, GRID, scheduler=scheduler, progress=lose)
+    found = fb.sweep(belt, path, GRID, scheduler=scheduler)
+    assert (found.solved, found.path.read_bytes()) == (1, swept.path.read_bytes())
+
+
+@pytest.mark.parametrize("name", ["a" * 247, "ü" * 123 + "a", "a" * 242], ids=["letters", "umlauts", "shorter"])
+def test_a_table_may_have_a_name_of_255_bytes(belt, swept, scheduler, tmp_path, name):
+    path = tmp_path / f"{name}.parquet"
+    with pytest.raises(KeyboardInterrupt):
+        fb.sweep(belt, path, GRID, scheduler=scheduler, progress=lambda *_: signal.raise_signal(signal.SIGINT))
+    [parts] = tmp_path.iterdir()
+    assert parts.name.startswith(name[:100])
+    assert parts.name.endswith(".parts")
+    found = fb.sweep(belt, path, GRID, scheduler=scheduler)
+    assert found.solved < 20
+    assert found.path.read_bytes() == swept.path.read_bytes()
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_long_names_have_parts_of_their_own(belt, scheduler, tmp_path):
+    folders = {table_parts._folder_name(f"{'a' * 246}{last}.parquet") for last in "ab"}
+    assert {len(folder) for folder in folders} == {255}
+    assert len(folders) == 2
+
+
+def test_a_second_sweep_at_the_same_time_is_refused_and_leaves_the_first_alone(belt, swept, scheduler, tmp_path):
+    path, refusals = tmp_path / "a.parquet", []
+
+    def start_again(solved, planned):
+        with pytest.raises(fb.InvalidArgument) as refused:
+            fb.sweep(belt, path, GRID, scheduler=scheduler)
+        refusals.append(str(refused.value))
+
+    found = fb.sweep(belt, path, GRID, scheduler=scheduler, progress=start_again)
+    assert set(refusals) == {f"{path}: found another sweep at work on it, allowed one at a time"}
+    assert (found.solved, found.path.read_bytes()) == (20, swept.path.read_bytes())
+
+
+def test_a_sweep_that_was_killed_locks_nothing(belt, belt_file, scheduler, tmp_path):
+    code = (
+        "import os, sys, fishbone as fb\n"
+        "kill = lambda *_: os.kill(os.getpid(), 9)\n"
+        "ranges = {sys.argv[1]: (0.4, 1.2, 5)}\n"
+        "fb.sweep(fb.load('belt.json'), 'a.parquet', ranges, scheduler=sys.argv[2], progress=kill)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code, Y, scheduler], cwd=tmp_path, check=False)
+    assert done.returncode == -signal.SIGKILL
+    assert (tmp_path / "a.parquet.parts" / "lock").exists()
+    found = fb.sweep(fb.load(belt_file), tmp_path / "a.parquet", {Y: (0.4, 1.2, 5)}, scheduler=scheduler)
+    assert 0 < found.solved < 5
+
+
+def test_a_file_system_without_locks_takes_sweeps(belt, swept, scheduler, tmp_path, monkeypatch):
+    def refuse(*_):
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr(lock, "_lock", refuse)
+    found = fb.sweep(belt, tmp_path / "a.parquet", GRID, scheduler=scheduler)
+    assert found.path.read_bytes() == swept.path.read_bytes()
+
+
+def test_a_finished_table_need_not_be_writable(belt, swept, tmp_path):
+    path = tmp_path / "a.parquet"
+    shutil.copy(swept.path, path)
+    path.chmod(0o444)
+    found = fb.sweep(belt, path, GRID)
+    assert (found.solved, found.statuses) == (0, swept.statuses)
+    with pytest.raises(fb.InvalidArgument, match="found a sweep that differs in its points"):
+        fb.sweep(belt, path, {Y: (0.5, 0.6, 3)})
 
 
 @pytest.mark.parametrize("is_finished", [True, False])
@@ -323,6 +506,21 @@ def test_a_file_that_is_no_table_of_a_sweep_is_refused(belt, tmp_path):
     assert path.read_text("utf-8") == "a letter"
 
 
+@pytest.mark.parametrize("text", [b"[]", b"a letter"])
+def test_a_table_whose_manifest_is_none_is_refused(belt, tmp_path, text):
+    path = tmp_path / "a.parquet"
+    pq.write_table(pa.table({"point": [0]}).replace_schema_metadata({table_parts.KEY: text}), path)
+    with pytest.raises(fb.InvalidArgument, match="found a file that is no table of a sweep, allowed a new file"):
+        fb.sweep(belt, path, GRID)
+
+
+def test_a_table_that_is_not_as_it_was_written_is_refused(belt, swept, tmp_path):
+    path = tmp_path / "a.parquet"
+    path.write_bytes(with_a_changed_byte(swept.path.read_bytes(), swept.names.index("status")))
+    with pytest.raises(fb.InvalidArgument, match="found a table that is not whole"):
+        fb.sweep(belt, path, GRID)
+
+
 def test_tables_go_to_a_parquet_file_alone(belt, tmp_path):
     with pytest.raises(fb.InvalidArgument, match=r"found \.csv, allowed \.parquet"):
         fb.sweep(belt, tmp_path / "a.csv", GRID)
@@ -338,7 +536,7 @@ def test_a_scheduler_that_does_not_answer_is_named(belt, tmp_path, monkeypatch, 
 def test_a_worker_of_another_version_is_refused(belt):
     number = {Y: number_of(belt, Y)}
     with pytest.raises(fb.InvalidArgument, match=f"found a worker with fishbone {fb.__version__}, allowed 0.0.1"):
-        solve_part(belt.to_dict(), number, 0, np.array([[0.5]]), shapes=False, version="0.0.1")
+        solve_part(belt.to_dict(), number, 0, np.array([[0.5]]), shapes=False, **HERE | {"version": "0.0.1"})
 
 
 def test_workers_without_a_package_are_named(scheduler):
@@ -410,12 +608,31 @@ def test_limits_are_in_the_units_of_the_scenario(film, text, limit):
         ("energy>--2", "found 'energy>--2'"),
         ("energy<2 mm", "found the unit 'mm' of energy, allowed J, mJ"),
         ("negative_modes<1 m", "found the unit 'm' of negative_modes, allowed none"),
+        ("energy<1e999", "found 1e999, allowed a number up to 1e+300"),
+        ("u>1", "found the column u, allowed one of numbers"),
+        ("edges.plus>1", "found the column edges.plus, allowed one of numbers"),
+        (5, "found 5, allowed a figure"),
     ],
 )
 def test_what_is_no_limit_is_refused(film, text, words):
     with pytest.raises(fb.InvalidArgument, match="limit: ") as refused:
         limit_of(film, text)
     assert words in str(refused.value)
+
+
+def test_columns_that_are_no_numbers_are_known_before_there_is_a_table(belt, swept):
+    kinds = {name: swept.column(name) for name in swept.names}
+    words = {name for name, values in kinds.items() if any(isinstance(x, str | bool | np.ndarray) for x in values)}
+    assert {"status", "message", "stable"} <= words <= WORDS
+    for name in WORDS:
+        with pytest.raises(fb.InvalidArgument, match=f"limit: found the column {name}, allowed one of numbers"):
+            limit_of(belt, f"{name}>1")
+
+
+def test_a_column_without_any_number_passes_nowhere(film, scheduler, tmp_path):
+    found = fb.sweep(film, tmp_path / "a.parquet", {"belt.width": (0.01, 0.02, 2)}, scheduler=scheduler)
+    assert found.column("half_turns").tolist() == [None, None]
+    assert found.passes("half_turns>-1").tolist() == [False, False]
 
 
 def test_units_are_refused_where_the_scenario_has_none(belt):
@@ -496,6 +713,10 @@ def test_a_sweep_without_any_figure_is_drawn_empty(run, belt_file, fields):
             "enrgy: found no such column, allowed those of the table",
         ),
         (("--set", "belt.width=1:2:3", "--figure", "a.txt"), "found .txt"),
+        (
+            ("--set", "belt.width=1:2:3", "--figure", "a.png", "--limit", "status>1"),
+            "limit: found the column status, allowed one of numbers",
+        ),
         (("--set", "belt.width=1:2:3", "--set", f"{Y}=1:2:3", "--set", f"{Z}=1:2:3", "--figure", "a.png"), "3 fields"),
     ],
 )
@@ -504,6 +725,24 @@ def test_invalid_use_ends_the_command_with_2_in_one_line(run, belt_file, words, 
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert found in err
     assert list(Path().iterdir()) == [Path("belt.json")]
+
+
+def test_a_limit_to_the_number_of_a_point_is_one_to_a_column(run, belt_file):
+    code, out, err = run("--set", f"{Y}=0.5:0.6:4", "-o", "a.parquet", "--limit", "point>0")
+    assert (code, err) == (0, "")
+    assert out.splitlines()[1] == "yield 75.00%, 3 of 4 points converged with point>0"
+
+
+def test_a_finished_table_that_is_read_only_is_drawn(run, belt_file):
+    words = ("--set", f"{Y}=0.5:0.6:2", "-o", "a.parquet")
+    assert run(*words)[0] == 0
+    Path("a.parquet").chmod(0o444)
+    code, out, err = run(*words, "--figure", "a.png")
+    assert (code, err) == (0, "")
+    assert "0 solved now" in out
+    assert Path("a.png").exists()
+    code, _, err = run("--set", f"{Y}=0.5:0.6:3", "-o", "a.parquet")
+    assert (code, err.count("\n")) == (2, 1)
 
 
 @pytest.mark.parametrize("package", ["distributed", "pyarrow"])
@@ -544,6 +783,30 @@ def test_a_map_is_white_where_there_is_no_equilibrium_and_has_a_line_at_the_limi
     assert "of 20 points converged with energy<12" in figure.get_suptitle()
     assert len(plot.sweep(swept, limit="energy<1e9").axes[0].collections) == 1
     assert "13 of 20 points converged" in plot.sweep(swept).get_suptitle()
+
+
+@pytest.mark.parametrize(
+    "ranges",
+    [
+        {Y: (0.5, 0.5, 2), Z: (0.0, 0.1, 2)},
+        {Y: (0.5, 0.5, 2), Z: (0.1, 0.1, 2)},
+        {Y: (0.5, np.nextafter(0.5, 1.0), 5), Z: (0.0, 0.1, 2)},
+        {Y: (0.5, 0.5, 1), Z: (0.0, 0.1, 3)},
+    ],
+)
+def test_a_map_has_a_cell_for_each_point_also_where_numbers_are_repeated(belt, scheduler, tmp_path, ranges):
+    found = fb.sweep(belt, tmp_path / "a.parquet", ranges, scheduler=scheduler)
+    counts = tuple(count for _, _, count in ranges.values())
+    assert found.counts == counts
+    figure = plot.sweep(found, limit="energy<12")
+    [mesh] = [part for part in figure.axes[0].collections if type(part).__name__ == "QuadMesh"]
+    np.testing.assert_array_equal(mesh.get_array(), found.column("energy").reshape(counts))
+    assert plot.encode(found, ".png", limit="energy<12").startswith(b"\x89PNG")
+
+
+def test_a_picture_with_a_limit_to_words_is_refused(swept):
+    with pytest.raises(fb.InvalidArgument, match="limit: found the column status, allowed one of numbers"):
+        plot.sweep(swept, limit="status>1")
 
 
 def test_lines_have_a_panel_for_each_figure_and_for_the_limit(film, belt, scheduler, tmp_path):

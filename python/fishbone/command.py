@@ -83,10 +83,14 @@ class Output(click.Path):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:  # noqa: ANN401 - as in click
         """The path."""
         path = Path(os.fsdecode(super().convert(value, param, ctx)))
-        obstacle = check_writable(path, self.suffixes)
+        obstacle = self.obstacle(path)
         if obstacle is not None:
             self.fail(f"{path}: {obstacle}", param, ctx)
         return path
+
+    def obstacle(self, path: Path) -> str | None:
+        """The reason why a path cannot be written; None where it can be."""
+        return check_writable(path, self.suffixes)
 
 
 PICTURE = Output(".png", ".pdf", ".svg")

@@ -13,14 +13,17 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Hashable, Iterator, Mapping
 
+DRAFTS = ".*.part"
+"""Names of the folders in which drafts are written, which stay where a process is killed."""
 _ANY_WRITES = stat.S_IWUSR | stat.S_IWGRP | stat.S_IWOTH
 """The mode bits of those who may write."""
 
 
 def check_writable(path: Path, suffixes: tuple[str, ...]) -> str | None:
     """The reason why a file cannot be written at a path, "found …, allowed …"; None where it can be written."""
-    if path.suffix.lower() not in suffixes:
-        return f"found {path.suffix or 'no suffix'}, allowed {', '.join(suffixes)}"
+    obstacle = check_suffix(path, suffixes)
+    if obstacle is not None:
+        return obstacle
     try:
         target = _target(path)
         obstacle = _protection(target, _status(target))
@@ -32,6 +35,22 @@ def check_writable(path: Path, suffixes: tuple[str, ...]) -> str | None:
     if obstacle is None and not os.access(folder, os.W_OK | os.X_OK):
         return f"found the folder {folder} read-only, allowed one to write in"
     return obstacle
+
+
+def check_suffix(path: Path, suffixes: tuple[str, ...]) -> str | None:
+    """The reason why a path has none of the suffixes, "found …, allowed …"; None where it has one."""
+    if path.suffix.lower() in suffixes:
+        return None
+    return f"found {path.suffix or 'no suffix'}, allowed {', '.join(suffixes)}"
+
+
+def is_file(path: Path) -> bool:
+    """Whether a path leads to a plain file; False of a path that leads nowhere."""
+    try:
+        status = _status(_target(path))
+    except OSError:
+        return False
+    return status is not None and stat.S_ISREG(status.st_mode)
 
 
 def identity(path: Path) -> Hashable:
@@ -48,7 +67,8 @@ def identity(path: Path) -> Hashable:
 def write_whole(path: Path, content: bytes) -> None:
     """Writes a file so that no reader sees a part of it, also where several write at once.
 
-    A file that exists keeps its mode; one that is read-only, or no plain file, stays as it is.
+    The content is on the disk before the file takes its place, so that a crash of the machine leaves no part of it. A
+    file that exists keeps its mode; one that is read-only, or no plain file, stays as it is.
 
     Errors: `OSError` with the path; the file is then as it was before.
     """
@@ -67,6 +87,7 @@ def write_all(contents: Mapping[Path, bytes]) -> None:
                 target = _target(path)
                 draft = drafts.enter_context(_draft(target))
                 draft.write_bytes(content)
+                _flush(draft)
                 moves.append((path, draft, target))
         for path, draft, target in moves:
             with _naming(path):
@@ -83,6 +104,7 @@ def whole(path: Path) -> Iterator[Path]:
         target = _target(path)
         with _draft(target) as draft:
             yield draft
+            _flush(draft)
             _move(draft, target)
 
 
@@ -95,6 +117,12 @@ def _draft(target: Path) -> Iterator[Path]:
     # In a folder of its own the name is short and free, and the mode of a new file is that of any other.
     with tempfile.TemporaryDirectory(prefix=".", suffix=".part", dir=target.parent) as folder:
         yield Path(folder) / "draft"
+
+
+def _flush(draft: Path) -> None:
+    """Waits until a draft is on the disk."""
+    with draft.open("r+b") as file:  # Windows flushes only what is open for writing.
+        os.fsync(file.fileno())
 
 
 def _move(draft: Path, target: Path) -> None:

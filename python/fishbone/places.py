@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fishbone.errors import NoSupport
+from fishbone.errors import InvalidArgument, NoSupport
+from fishbone.pose import numbers_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -27,7 +28,7 @@ def support_index(support: Place, places: Sequence[float], length: float) -> int
     Units: `places`, the arc lengths of the supports, and `length`, that of the belt, in the same.
     Errors: `NoSupport`.
     """
-    at = {"start": 0.0, "end": length}.get(support, math.nan) if isinstance(support, str) else float(support)
+    at = {"start": 0.0, "end": length}.get(support, math.nan) if isinstance(support, str) else _number(support)
     there = next((index for index, place in enumerate(places) if abs(place - at) <= SAME_PLACE * length), None)
     if isinstance(support, str) or not at.is_integer() or not -len(places) <= at < len(places):
         if there is None:
@@ -39,6 +40,14 @@ def support_index(support: Place, places: Sequence[float], length: float) -> int
         found = f"found an index and the arc length of supports[{there}]"
         raise _no_support(support, f"{found}, allowed {there} for this one")
     return index
+
+
+def _number(support: Any) -> float:  # noqa: ANN401 - whatever a caller brings
+    """The number that names a support; NaN of what is no number."""
+    try:
+        return float(support if isinstance(support, int | float) else numbers_of("support", support, ()))
+    except (InvalidArgument, OverflowError):
+        return math.nan
 
 
 def _no_support(support: Place, text: str) -> NoSupport:

@@ -68,15 +68,15 @@ class Pose(NamedTuple):
 
 
 def numbers_of(name: str, values: Any, shape: tuple[int | None, ...]) -> Floats:  # noqa: ANN401 - whatever a caller brings
-    """Finite numbers of a shape, of which lengths that are None may be any.
+    """Finite real numbers of a shape, of which lengths that are None may be any. Text is no number.
 
     Errors: `InvalidArgument`, whose message begins with `name`.
     """
     allowed = str(shape).replace("None", "m")
-    try:
-        numbers = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InvalidArgument(f"{name}: found {values!r}, allowed numbers of shape {allowed}") from None
+    numbers = _real(values)
+    if numbers is None:
+        found, kind = " ".join(repr(values).split()), f"numbers of shape {allowed}" if shape else "a number"
+        raise InvalidArgument(f"{name}: found {found}, allowed {kind}")
     if len(numbers.shape) != len(shape) or any(
         length not in {None, found} for length, found in zip(shape, numbers.shape, strict=True)
     ):
@@ -86,6 +86,20 @@ def numbers_of(name: str, values: Any, shape: tuple[int | None, ...]) -> Floats:
     if infinite is not None:
         raise InvalidArgument(f"{name}: found {infinite}, allowed finite numbers")
     return numbers
+
+
+def _real(values: Any) -> Floats | None:  # noqa: ANN401 - whatever a caller brings
+    """Values as an array of floats; None where they are no real numbers, or some are masked."""
+    parts = values if isinstance(values, list | tuple) else [values]
+    if any(isinstance(part, np.ma.MaskedArray) and np.ma.is_masked(part) for part in parts):
+        return None
+    try:
+        array = np.asarray(values)
+        kind = array.dtype.kind
+        is_real = kind in "biuf" or (kind == "O" and not any(isinstance(x, str | bytes | complex) for x in array.flat))
+        return array.astype(np.float64, copy=False) if is_real else None
+    except (TypeError, ValueError, OverflowError):
+        return None
 
 
 def pose_of(name: str, pose: Any) -> Pose:  # noqa: ANN401 - whatever a caller brings
@@ -114,6 +128,8 @@ def parts_of(name: str, pose: Any) -> tuple[list[float], list[float] | None]:  #
 
 def _is_position(pose: Any) -> bool:  # noqa: ANN401 - whatever a caller brings
     try:
+        if isinstance(pose, list | tuple):  # without an array, which warns of masked entries
+            return len(pose) == 3 and not any(map(np.ndim, pose))  # noqa: PLR2004 - a vector
         return bool(np.shape(pose) == (3,))
     except ValueError:  # of rows of several lengths
         return False

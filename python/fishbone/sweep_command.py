@@ -11,9 +11,9 @@ import fishbone
 from fishbone.command import PICTURE, Command, Input, Invalid, NoEquilibrium, Output
 from fishbone.files import write_whole
 from fishbone.progress import progress
-from fishbone.sweep import SUFFIX
 from fishbone.sweep.limit import check_column, describe_yield, limit_of
-from fishbone.sweep.rows import figures_of
+from fishbone.sweep.parts import SUFFIX, check_table
+from fishbone.sweep.rows import POINT, figures_of
 from fishbone.terminal import write_out
 from fishbone.text import shown
 
@@ -22,6 +22,17 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 _PLUS_MINUS = re.compile(r"(?:±|\+-)\s*(.*)")
+
+
+class Table(Output):
+    """The table of a sweep, to write or finished."""
+
+    def __init__(self) -> None:
+        super().__init__(SUFFIX)
+
+    def obstacle(self, path: Path) -> str | None:
+        """The reason why there can be no table at a path; None where there is none."""
+        return check_table(path)
 
 
 @click.command(cls=Command)
@@ -43,7 +54,7 @@ _PLUS_MINUS = re.compile(r"(?:±|\+-)\s*(.*)")
     metavar='"FIELD=±X"',
     help="A number of the scenario, drawn uniformly within X of its value; +-X too. With --sample. May be repeated.",
 )
-@click.option("-o", "--out", type=Output(SUFFIX), required=True, help="Write the table: .parquet.")
+@click.option("-o", "--out", type=Table(), required=True, help="Write the table: .parquet.")
 @click.option("--shapes", is_flag=True, help="Write the arrays along the belt too, as columns of lists.")
 @click.option("--scheduler", metavar="ADDRESS", help="Solve on a Dask cluster: tcp://HOST:PORT of its scheduler.")
 @click.option(
@@ -116,7 +127,7 @@ def _check_limit(scenario: fishbone.Scenario, limit: str, fields: Collection[str
     with progress("solving"):
         figures = figures_of(scenario.to_dict(), shapes=False)
     if figures["status"] == "converged":
-        check_column(column, [*figures, *fields])
+        check_column(column, [POINT, *figures, *fields])
 
 
 def _fields(option: str, texts: Sequence[str], number: Callable[[str, str], Any]) -> dict[str, Any]:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -24,6 +23,15 @@ if TYPE_CHECKING:
     from fishbone.names import End, Place, Status
 
     Floats = NDArray[np.float64]
+
+
+State: TypeAlias = bytes | bytearray | memoryview
+"""The state of a tracker."""
+_STATES = (bytes, bytearray, memoryview)
+MOST_ITERATIONS = 2**63
+"""Number of iterations from which on a limit is none."""
+ROUNDING = 1e-12
+"""Relative distance beyond an edge up to which a point is on it."""
 
 
 class Update(NamedTuple):
@@ -103,24 +111,32 @@ class Tracker:
     one runs at a time: another thread waits, and a handler that interrupts one gets a `RuntimeError` from the others.
 
     Errors: `NoTracker` where the solve finds no minimum, or where a support cannot be moved; `NoSupport`;
-    `InvalidArgument` for bytes that are no state of this version, and where no support or one twice is to move.
+    `InvalidArgument` for bytes that are no state of this version, for supports beside a state, and where no support or
+    one twice is to move.
     """
 
-    __slots__ = ("_inner",)
+    __slots__ = ("_half_width", "_inner")
     _inner: _core.Tracker
+    _half_width: float | None
+    """Half the width of the belt, once it is known."""
 
     def __init__(
         self,
-        start: Scenario | Equilibrium | bytes,
+        start: Scenario | Equilibrium | State,
         support: Place = "end",
         *,
         supports: Sequence[Place] | None = None,
     ) -> None:
-        if isinstance(start, bytes):
-            self._inner = _core.Tracker.from_bytes(start)
+        self._half_width = None
+        if isinstance(start, _STATES):
+            if supports is not None or support != "end":
+                raise InvalidArgument("supports: found supports beside a state, allowed none: it has its own")
+            self._inner = _core.Tracker.from_bytes(bytes(start))
             return
         found = start if isinstance(start, Equilibrium) else solve(start)
         inner = found._inner  # noqa: SLF001 - of this package
+        if isinstance(supports, str) or not isinstance(supports, Iterable | None):
+            raise InvalidArgument(f'supports: found {supports!r}, allowed a list of supports, as ["start", "end"]')
         places = [support] if supports is None else list(supports)
         # The source's method has no reactions, and the core refuses it whatever the supports.
         moving = [found._support_index(place) for place in places] if inner.reactions else [0]  # noqa: SLF001
@@ -129,11 +145,13 @@ class Tracker:
         self._inner = _core.Tracker(inner, moving)
 
     @classmethod
-    def restore(cls, state: bytes) -> Tracker:
+    def restore(cls, state: State) -> Tracker:
         """A tracker in the state of another one: the updates of both have the same results, bit for bit.
 
-        Errors: `InvalidArgument` for bytes that are no state of this version.
+        Errors: `InvalidArgument` for what is no state of this version.
         """
+        if not isinstance(state, _STATES):
+            raise InvalidArgument(f"state: found {type(state).__name__}, allowed the bytes of Tracker.state")
         return cls(state)
 
     def state(self) -> bytes:
@@ -156,6 +174,7 @@ class Tracker:
     @classmethod
     def _of(cls, inner: _core.Tracker) -> Tracker:
         tracker = cls.__new__(cls)
+        tracker._half_width = None  # noqa: SLF001 - its own class
         tracker._inner = inner  # noqa: SLF001 - its own class
         return tracker
 
@@ -181,14 +200,16 @@ class Tracker:
 
         Shapes: (3,) each; a matrix (4, 4).
         Units: those of the scenario; rad; s.
-        Errors: `InvalidArgument` for other shapes, for numbers that are not finite, and for limits that are not
-        positive; `NoSupport`; `InvalidScenario` for a pose that no scenario may hold, such as a position too many
-        lengths away, and for a support that does not move. The tracker then stays where it was.
+        Errors: `InvalidArgument` for other shapes, for numbers that are not finite, for two poses of one support, and
+        for limits that are not positive; `NoSupport`; `InvalidScenario` for a pose that no scenario may hold, such as a
+        position too many lengths away, and for a support that does not move. The tracker then stays where it was.
         """
         if isinstance(position, Mapping):
             if rotation is not None:
                 raise InvalidArgument("rotation: found one beside poses by support, allowed none")
             to = [(self._index_of(place), *parts_of("pose", pose)) for place, pose in position.items()]
+            if len({index for index, *_ in to}) < len(to):
+                raise InvalidArgument(f"pose: found two of one support in {list(position)}, allowed one of each")
         else:
             moving = self._inner.moving
             if len(moving) != 1:
@@ -196,10 +217,11 @@ class Tracker:
                 raise InvalidArgument(f'pose: {found}, allowed poses by support, as {{"end": pose}}')
             pose: Any = position if rotation is None else (position, rotation)
             to = [(moving[0], *parts_of("pose", pose))]
-        for name, limit in (("max_time", max_time), ("max_iterations", max_iterations)):
-            if limit is not None and not (limit > 0 and limit < math.inf):
-                raise InvalidArgument(f"{name}: found {limit}, allowed a finite positive number")
-        return Update(*self._inner.update(to, max_time, max_iterations, check_crossing))
+        time, iterations = _limit("max_time", max_time), _limit("max_iterations", max_iterations)
+        if iterations is not None and not iterations.is_integer():
+            raise InvalidArgument(f"max_iterations: found {max_iterations}, allowed a whole number")
+        steps = None if iterations is None else int(min(iterations, MOST_ITERATIONS))
+        return Update(*self._inner.update(to, time, steps, _flag("check_crossing", check_crossing)))
 
     def update_many(
         self, positions: npt.ArrayLike, rotations: npt.ArrayLike | None = None, *, stop_on_snap: bool = True
@@ -229,7 +251,7 @@ class Tracker:
         if len(to) * len(u) > MAX_POINTS:
             points = f"found {len(to)} of {len(u)} nodes each"
             raise InvalidArgument(f"positions: {points}, allowed up to {MAX_POINTS // 10**6} million nodes in all")
-        found, (shapes, force, moment) = self._inner.update_many(to, stop_on_snap)
+        found, (shapes, force, moment) = self._inner.update_many(to, _flag("stop_on_snap", stop_on_snap))
         updates = [Update(*update) for update in found]
         valid = sum(update.status == "converged" for update in updates)
         each = (len(updates), *shape[1:])
@@ -246,14 +268,22 @@ class Tracker:
         stays as it was.
 
         Units: `hold` in those of the scenario.
-        Errors: `InvalidArgument` where neither is given; `NoSupport`; `InvalidScenario` for supports that no scenario
-        may have, such as two at one place.
+        Errors: `InvalidArgument` where neither is given, for a `hold` that is no place, and where no support would be
+        left to move; `NoSupport`; `InvalidScenario` for supports that no scenario may have, such as two at one place.
         """
         if hold is None and release is None:
             raise InvalidArgument("regrasp: found neither a hold nor a release, allowed one or both")
+        index = None if release is None else self._index_of(release)
+        if hold is None and self._inner.moving == [index]:
+            found = f"found {release!r}, the only support that moves"
+            raise InvalidArgument(f"release: {found}, allowed with a hold, or where another one moves")
+        return Update(*self._inner.regrasp(None if hold is None else self._arc_length(hold), index))
+
+    def _arc_length(self, hold: End | float) -> float:
         ends = {"start": 0.0, "end": float(self.u[-1])}
-        at = ends.get(hold, math.nan) if isinstance(hold, str) else hold
-        return Update(*self._inner.regrasp(at, None if release is None else self._index_of(release)))
+        if isinstance(hold, str) and hold not in ends:
+            raise InvalidArgument(f'hold: found {hold!r}, allowed "start", "end" or an arc length')
+        return ends[hold] if isinstance(hold, str) else float(numbers_of("hold", hold, ()))
 
     @property
     def energy(self) -> float:
@@ -305,15 +335,26 @@ class Tracker:
         Shapes: (n, 3, 6).
         Units: `v` in those of the scenario.
         Errors: `NoSupport`; `NoSensitivity` where the belt has no slack or a part of it has stayed flat under load;
-        `InvalidArgument` of points off the spine with the energy "shell".
+        `InvalidArgument` of points beyond the edges, and of points off the spine with the energy "shell".
         """
+        return self._inner.derivatives(self._index_or_first(support), self._across(v).tolist())[0]
+
+    def _across(self, v: float | Literal["minus", "plus"]) -> Floats:
+        """Places across the board at the nodes."""
         if isinstance(v, str):
             if v not in Edges._fields:
                 raise InvalidArgument(f'v: found "{v}", allowed "minus", "plus" or a number')
-            across = self._inner.rib_ends()[Edges._fields.index(v)]
-        else:
-            across = np.full(len(self.u), numbers_of("v", v, ()))
-        return self._inner.derivatives(self._index_or_first(support), across.tolist())[0]
+            return self._inner.rib_ends()[Edges._fields.index(v)]
+        number = float(numbers_of("v", v, ()))
+        if number != 0.0:
+            self._check_across(number)
+        return np.full(len(self.u), number)
+
+    def _check_across(self, v: float) -> None:
+        if self._half_width is None:
+            self._half_width = 0.5 * float(self.equilibrium().scenario.to_dict()["belt"]["width"])
+        if abs(v) > self._half_width * (1.0 + ROUNDING):
+            raise InvalidArgument(f"v: found {v:g}, allowed {-self._half_width:g} to {self._half_width:g}")
 
     def stiffness(self, support: Place | None = None) -> Floats:
         """Derivatives of a support's reaction by its motion, by default of the first that moves.
@@ -356,3 +397,20 @@ class Tracker:
 
     def _index_of(self, support: Place) -> int:
         return support_index(support, self._inner.supports, float(self.u[-1]))
+
+
+def _limit(name: str, limit: float | None) -> float | None:
+    """A limit of an update, checked."""
+    if limit is None:
+        return None
+    number = float(numbers_of(name, limit, ()))
+    if number <= 0.0:
+        raise InvalidArgument(f"{name}: found {limit}, allowed a finite positive number")
+    return number
+
+
+def _flag(name: str, flag: object) -> bool:
+    """A flag, checked."""
+    if not isinstance(flag, bool | np.bool_):
+        raise InvalidArgument(f"{name}: found {flag!r}, allowed True or False")
+    return bool(flag)

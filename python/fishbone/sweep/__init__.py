@@ -12,10 +12,9 @@ import numpy as np
 
 from fishbone import _core
 from fishbone.errors import InvalidArgument
-from fishbone.files import check_writable
 from fishbone.sweep.extra import extra
-from fishbone.sweep.limit import check_column, limit_of
-from fishbone.sweep.parts import Parts
+from fishbone.sweep.limit import check_column, limit_of, numbers_in
+from fishbone.sweep.parts import Parts, check_table, read_parquet, rows_in
 from fishbone.sweep.points import Grid, number_of, points_of
 from fishbone.sweep.rows import solve_part
 from fishbone.sweep.workers import results
@@ -30,7 +29,6 @@ if TYPE_CHECKING:
     from fishbone.sweep.points import Points
 
 SCHEMA = "fishbone.sweep/1"
-SUFFIX = ".parquet"
 PARTS = 64
 """Greatest number of parts of a sweep of few points: enough for all cores to have work to the end."""
 LARGEST_PART = 256
@@ -52,6 +50,8 @@ class Sweep:
         """The fields that are swept, each a column of the same name."""
         self.is_grid = isinstance(points, Grid)
         """Whether the points are a grid, not a sample."""
+        self.counts: tuple[int, ...] = points.counts
+        """Number of values of each field of a grid; of a sample its number of points alone."""
         self.solved = solved
         """Number of points that `sweep` has solved for it; the others were in the file or in its parts."""
         self.names: tuple[str, ...] = tuple(extra("pyarrow.parquet").read_schema(path).names)
@@ -66,10 +66,12 @@ class Sweep:
         """A column. Where a row has no number it is NaN in a column of numbers, else None.
 
         Shapes: (points,).
-        Errors: `InvalidArgument` where there is no such column.
+        Errors: `InvalidArgument` where there is no such column, and where the table cannot be read.
         """
         check_column(name, self.names)
-        table = extra("pyarrow.parquet").ParquetFile(self.path).read(columns=[name])
+        table = read_parquet(self.path, lambda file: rows_in(file, [name]))
+        if table is None:
+            raise InvalidArgument(f"{self.path}: found a table that is not whole, allowed a new file")
         values: NDArray[Any] = table[name].to_numpy()
         return values
 
@@ -85,9 +87,7 @@ class Sweep:
         checked = limit_of(self.scenario, limit)
         if "converged" not in self.statuses:  # there may be no figures at all
             return np.zeros(len(self), dtype=np.bool_)
-        figures = self.column(checked.column)
-        if not np.issubdtype(figures.dtype, np.number):
-            raise InvalidArgument(f"limit: found the column {checked.column}, allowed one of numbers")
+        figures = numbers_in(checked.column, self.column(checked.column))
         passing: NDArray[np.bool_] = checked.passes(figures) & (self.column("status") == "converged")
         return passing
 
@@ -120,37 +120,40 @@ def sweep(  # noqa: PLR0913 - keywords all but three
 
     Every point is solved by itself, as `solve` does, so that a row depends on nothing but its point. Until the table is
     finished its parts are in the folder `path.parts`. A call with the same arguments goes on from there, or solves
-    nothing where the table is finished.
+    nothing where the table is finished. Parts that are not whole are solved again.
 
     Processes are started for the cores of this machine, unless `scheduler` is the address of a Dask scheduler, such as
     "tcp://host:8786". As always with processes, a script calls this under `if __name__ == "__main__":`.
     `progress(solved, all)` is called from the calling thread, for the points that are solved by this call.
 
-    Errors: `NoPath` where the scenario has no such number; `InvalidArgument` for other invalid arguments, and where
-    `path` holds another sweep; `MissingPackage`; `FishboneError` where the workers are lost; `OSError`; any error that
-    `progress` raises.
+    Errors: `NoPath` where the scenario has no such number; `InvalidArgument` for other invalid arguments, where `path`
+    holds another sweep, and where another process is at work on it; `MissingPackage`; `FishboneError` where the workers
+    are lost, or a part; `OSError`; any error that `progress` raises.
     """
     target = Path(path)
-    obstacle = check_writable(target, (SUFFIX,))
+    obstacle = check_table(target)
     if obstacle is not None:
         raise InvalidArgument(f"{target}: {obstacle}")
     points = points_of(scenario, ranges, tolerances or {}, sample, seed)
     tables = scenario.to_dict()
-    parts = Parts(target, _manifest(tables, points, shapes=shapes))
     size = min(LARGEST_PART, math.ceil(points.total / PARTS))
-    firsts = [first for first in range(0, points.total, size) if not (parts.is_finished or parts.has(first))]
-    lengths = {first: min(size, points.total - first) for first in firsts}
+    lengths = {first: min(size, points.total - first) for first in range(0, points.total, size)}
+    parts = Parts(target, _manifest(tables, points, shapes=shapes), lengths)
     numbers = {field: number_of(scenario, field) for field in points.fields}
-    tasks = ((tables, numbers, first, points.values(first, first + length)) for first, length in lengths.items())
-    solved, planned = 0, sum(lengths.values())
-    common = {"shapes": shapes, "version": _core.__version__}
-    with contextlib.closing(results(scheduler, solve_part, tasks, len(lengths), common)) as found:
-        for first, content in found:
-            parts.add(first, content)
-            solved += lengths[first]
-            if progress is not None:
-                progress(solved, planned)
-    parts.finish()
+    common = {"shapes": shapes, "version": _core.__version__, "origin": parts.origin}
+    solved = 0
+    if not parts.is_finished:
+        with parts.held():
+            missing = parts.missing()
+            tasks = ((tables, numbers, first, points.values(first, first + size)) for first in missing)
+            with contextlib.closing(results(scheduler, solve_part, tasks, len(missing), common)) as found:
+                for first, content in found:
+                    parts.add(first, content)
+                    solved += missing[first]
+                    if progress is not None:
+                        progress(solved, sum(missing.values()))
+            parts.finish()
+    parts.clear()
     return Sweep(target, scenario, points, solved)
 
 

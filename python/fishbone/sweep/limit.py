@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import difflib
 import re
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+import numpy as np
 
 from fishbone.errors import InvalidArgument
+from fishbone.sweep.points import LARGEST
+from fishbone.sweep.rows import ALONG, WORDS
 
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    import numpy as np
     from numpy.typing import NDArray
 
     from fishbone.scenario import Scenario
@@ -26,6 +29,7 @@ UNITS: dict[Quantity, dict[str, float]] = {
     "energy": {"J": 1.0, "mJ": 1e-3},
 }
 """The units of a limit, each in that of `fishbone.units.SI`."""
+_FORM = "allowed a figure, < or > and a number, as in bend_radius.area.p99>0.002"
 _LIMIT = re.compile(r"\s*([^<>\s]+)\s*([<>])\s*([-+.\deE]+)\s*(.*?)\s*")
 
 
@@ -52,16 +56,19 @@ class Limit(NamedTuple):
 def limit_of(scenario: Scenario, text: str) -> Limit:
     """The limit of a text such as "bend_radius.area.p99 > 2 mm".
 
-    Errors: `InvalidArgument` where the text is no limit, or its unit is not one of the figure.
+    Errors: `InvalidArgument` where the text is no limit, its column never has numbers, or its unit is not one of the
+    figure.
     """
-    found = _LIMIT.fullmatch(text)
+    found = _LIMIT.fullmatch(str(text))
     try:
         column, sign, number, unit = found.groups() if found is not None else ("", "", "", "")
         value = float(number)
     except ValueError:
-        raise InvalidArgument(
-            f"limit: found {text!r}, allowed a figure, < or > and a number, as in bend_radius.area.p99>0.002"
-        ) from None
+        raise InvalidArgument(f"limit: found {text!r}, {_FORM}") from None
+    if abs(value) > LARGEST:
+        raise InvalidArgument(f"limit: found {number}, allowed a number up to {LARGEST:g}")
+    if column in WORDS or column.partition(".")[0] in ALONG:
+        raise _no_numbers(column)
     return Limit(column, "<" if sign == "<" else ">", value * _factor(scenario, column, unit))
 
 
@@ -71,8 +78,24 @@ def check_column(name: str, names: Collection[str]) -> None:
     Errors: `InvalidArgument`, with the nearest of the names.
     """
     if name not in names:
-        [nearest] = difflib.get_close_matches(name, names, n=1, cutoff=0.0)
+        [nearest] = difflib.get_close_matches(str(name), names, n=1, cutoff=0.0)
         raise InvalidArgument(f"{name}: found no such column, allowed those of the table, as {nearest}")
+
+
+def numbers_in(column: str, values: NDArray[Any]) -> Floats:
+    """The values of a column as numbers, NaN where there is none.
+
+    Shapes: that of `values`.
+    Errors: `InvalidArgument` where they are no numbers.
+    """
+    is_empty = values.dtype == object and all(value is None for value in values)
+    if not (is_empty or np.issubdtype(values.dtype, np.number)):
+        raise _no_numbers(column)
+    return values.astype(np.float64)
+
+
+def _no_numbers(column: str) -> InvalidArgument:
+    return InvalidArgument(f"limit: found the column {column}, allowed one of numbers")
 
 
 def describe_yield(passing: NDArray[np.bool_], limit: str) -> str:

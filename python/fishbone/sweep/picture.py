@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from fishbone import chart
 from fishbone.errors import InvalidArgument
-from fishbone.sweep.limit import describe_yield, limit_of, quantity_of
+from fishbone.sweep.limit import describe_yield, limit_of, numbers_in, quantity_of
 from fishbone.units import labelled
 
 if TYPE_CHECKING:
@@ -93,9 +93,9 @@ def _draw_map(found: Sweep, limit: Limit | None) -> Figure:
     name, _, _ = chart.COLORS
     drawn: ScalarMappable
     if found.is_grid:
-        shape = len(np.unique(x)), len(np.unique(y))
-        drawn = axes.pcolormesh(*(array.reshape(shape) for array in (x, y, values)), cmap=name, shading="nearest")
-        _draw_limit(axes, [array.reshape(shape) for array in (x, y, values)], limit)
+        grid = [array.reshape(found.counts) for array in (x, y, values)]
+        drawn = axes.pcolormesh(*grid, cmap=name, shading="nearest")
+        _draw_limit(axes, grid, limit)
     else:
         drawn = axes.scatter(x, y, c=values, cmap=name, s=8.0, plotnonfinite=False)
         failed = np.isnan(values)
@@ -117,7 +117,7 @@ def _draw_limit(axes: Axes, grid: list[Floats], limit: Limit | None) -> None:
 
 def _converged(found: Sweep, column: str) -> Floats:
     """The finite figures of the points that have converged, NaN at the others."""
-    values = found.column(column).astype(np.float64)
+    values = numbers_in(column, found.column(column))
     figures: Floats = np.where((found.column("status") == "converged") & np.isfinite(values), values, np.nan)
     return figures
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 import re
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -12,10 +13,11 @@ import numpy as np
 from fishbone import _core
 from fishbone.equilibrium import core_of
 from fishbone.errors import InvalidArgument, NoPath
+from fishbone.pose import numbers_of
 from fishbone.sweep.extra import extra
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
@@ -25,6 +27,8 @@ if TYPE_CHECKING:
 
 MAX_POINTS = 10_000_000
 """Greatest number of points of a grid, and of numbers drawn for a sample."""
+LARGEST = 1e300
+"""Greatest number of a range, of a tolerance and of a limit: their differences and pictures do not overflow."""
 _GRID, _RANGE = 3, 2
 """Numbers of an axis of a grid, start:stop:n, and of a range of a sample, start:stop."""
 
@@ -55,9 +59,14 @@ class Grid(NamedTuple):
     """First number, last number and count of each field."""
 
     @property
+    def counts(self) -> tuple[int, ...]:
+        """Number of values of each field."""
+        return tuple(count for _, _, count in self.axes)
+
+    @property
     def total(self) -> int:
         """Number of points."""
-        return math.prod(count for _, _, count in self.axes)
+        return math.prod(self.counts)
 
     @property
     def design(self) -> dict[str, Any]:
@@ -69,7 +78,7 @@ class Grid(NamedTuple):
 
         Shapes: (points, fields).
         """
-        places = np.unravel_index(np.arange(first, min(last, self.total)), [count for _, _, count in self.axes])
+        places = np.unravel_index(np.arange(first, min(last, self.total)), self.counts)
         return np.column_stack([_along(axis, place) for axis, place in zip(self.axes, places, strict=True)])
 
 
@@ -79,6 +88,11 @@ class Sample(NamedTuple):
     fields: tuple[str, ...]
     drawn: Floats
     """The numbers of the points, shape (count, fields)."""
+
+    @property
+    def counts(self) -> tuple[int, ...]:
+        """Number of points, alone."""
+        return self.drawn.shape[:1]
 
     @property
     def total(self) -> int:
@@ -113,6 +127,8 @@ def points_of(
 
     Errors: `NoPath` where the scenario has no such number; `InvalidArgument`.
     """
+    _check_fields("ranges", ranges)
+    _check_fields("tolerances", tolerances)
     if not ranges and not tolerances:
         raise InvalidArgument("sweep: found no field, allowed one or more")
     fields = (*ranges, *tolerances)
@@ -144,6 +160,11 @@ def number_of(scenario: Scenario, field: str) -> Number:
     for key in keys:
         value = value[key]
     return Number(keys, float(value), isinstance(value, int))
+
+
+def _check_fields(name: str, numbers: object) -> None:
+    if not (isinstance(numbers, Mapping) and all(isinstance(field, str) for field in numbers)):
+        raise InvalidArgument(f'{name}: found {numbers!r}, allowed numbers by field, as in {{"belt.width": …}}')
 
 
 def _along(axis: tuple[float, float, int], place: NDArray[np.intp]) -> Floats:
@@ -181,10 +202,12 @@ def _sample(
         raise InvalidArgument(f"seed: found {seed!r}, allowed a whole number from 0")
     spans = [_numbers(field, numbers, _RANGE) for field, numbers in ranges.items()]
     for field, tolerance in tolerances.items():
-        if not 0.0 < tolerance < math.inf:
-            raise InvalidArgument(f"{field}: found the tolerance {tolerance!r}, allowed a positive finite number")
+        distance = float(numbers_of(field, tolerance, ()))
+        if not 0.0 < distance <= LARGEST:
+            found = f"found the tolerance {distance:g}"
+            raise InvalidArgument(f"{field}: {found}, allowed a positive number up to {LARGEST:g}")
         middle = number_of(scenario, field).value
-        spans.append([middle - tolerance, middle + tolerance])
+        spans.append([middle - distance, middle + distance])
     random = np.random.default_rng(seed)
     shares = np.column_stack([_latin(len(ranges), count, random), random.random((count, len(tolerances)))])
     start, stop = np.array(spans).T
@@ -204,13 +227,12 @@ def _latin(size: int, count: int, random: np.random.Generator) -> Floats:
 
 def _numbers(field: str, numbers: Sequence[float], count: int) -> list[float]:
     """The numbers of a field, checked."""
-    try:
-        found = [float(number) for number in numbers]
-    except (TypeError, ValueError, OverflowError):
-        raise InvalidArgument(f"{field}: found {numbers!r}, allowed numbers") from None
-    if len(found) != count or not all(map(math.isfinite, found)):
-        text = ":".join(f"{number:g}" for number in found)
+    found: list[float] = numbers_of(field, numbers, (None,)).tolist()
+    text = ":".join(f"{number:g}" for number in found)
+    if len(found) != count:
         raise InvalidArgument(f"{field}: found {text}, allowed start:stop:n in a grid, start:stop in a sample")
+    if max(map(abs, found)) > LARGEST:
+        raise InvalidArgument(f"{field}: found {text}, allowed numbers up to {LARGEST:g}")
     return found
 
 

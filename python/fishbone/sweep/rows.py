@@ -19,10 +19,16 @@ if TYPE_CHECKING:
 
     Row = dict[str, Any]
 
+POINT = "point"
+"""The column of the number of a point."""
+ORIGIN = b"fishbone.sweep.origin"
+"""Name of the digest of a sweep in the metadata of a part."""
 ALONG = frozenset(
     ("u", "position", "frame", "bend", "torsion", "rib_slope", "rib_angle", "curvature", "edges", "internal")
 )
 """Fields of a result that have a value for every node."""
+WORDS = frozenset(("status", "message", "warnings", "energy_model", "stable", "crosses_itself"))
+"""Columns of a table whose values, where it has any, are no numbers."""
 LEFT_OUT = frozenset(("schema", "scenario", "solve_time"))
 """Fields of a result that a row repeats or knows better, and the time, which differs from run to run."""
 UNBENT = frozenset(("bend_radius.spine.value", "least_spine_radius.value")) | {
@@ -32,11 +38,19 @@ UNBENT = frozenset(("bend_radius.spine.value", "least_spine_radius.value")) | {
 
 
 def solve_part(  # noqa: PLR0913 - keywords all but four
-    tables: dict[str, Any], numbers: dict[str, Number], first: int, values: Floats, *, shapes: bool, version: str
+    tables: dict[str, Any],
+    numbers: dict[str, Number],
+    first: int,
+    values: Floats,
+    *,
+    shapes: bool,
+    version: str,
+    origin: str,
 ) -> tuple[int, bytes]:
     """Solves the points from number `first` on, one after the other; returns `first` and a Parquet file of their rows.
 
-    `numbers` are the fields that are swept. A point starts from nothing that another one has found.
+    `numbers` are the fields that are swept, `origin` is the digest of the sweep. A point starts from nothing that
+    another one has found.
 
     Shapes: values (points, fields).
     Errors: `InvalidArgument` where the fishbone of this process is not of `version`, that of the sweep.
@@ -50,8 +64,8 @@ def solve_part(  # noqa: PLR0913 - keywords all but four
         for field, value in swept.items():
             numbers[field].put(tables, value)
         # The place of a support, which a result repeats, may be swept.
-        rows.append({"point": point, **swept} | figures_of(tables, shapes=shapes) | swept)
-    return first, _encode(rows)
+        rows.append({POINT: point, **swept} | figures_of(tables, shapes=shapes) | swept)
+    return first, _encode(rows, origin)
 
 
 def figures_of(tables: dict[str, Any], *, shapes: bool) -> Row:
@@ -93,11 +107,12 @@ def _is_vector(value: Any) -> bool:  # noqa: ANN401 - plain data
     )
 
 
-def _encode(rows: list[Row]) -> bytes:
+def _encode(rows: list[Row], origin: str) -> bytes:
     """Rows as a Parquet file: a column for every name in the order of its first row, null where a row has none."""
     arrow, parquet = extra("pyarrow"), extra("pyarrow.parquet")
     names = dict.fromkeys(name for row in rows for name in row)
+    table = arrow.table({name: [row.get(name) for row in rows] for name in names}, metadata={ORIGIN: origin})
     sink = arrow.BufferOutputStream()
-    parquet.write_table(arrow.table({name: [row.get(name) for row in rows] for name in names}), sink)
+    parquet.write_table(table, sink, write_page_checksum=True)
     content: bytes = sink.getvalue().to_pybytes()
     return content
