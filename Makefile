@@ -137,8 +137,9 @@ $(VENV)/.lint: $(CORE) $(PYTHON_SOURCES)
 	@$(BIN)/python -m mypy.stubtest --concise fishbone._core
 	@touch $@
 
-# A worker for each core, up to eight. Each starts with tests that stand together and share what is solved once.
-$(VENV)/.pytest: $(CORE) $(PYTHON_SOURCES) $(TEXTS)
+# A worker for each core, up to eight. Each starts with tests that stand together and share what is solved once. Under
+# `make --jobs` they wait for the tests in Rust: some of them watch the clock.
+$(VENV)/.pytest: $(CORE) $(PYTHON_SOURCES) $(TEXTS) | $(VENV)/.rust $(VENV)/.wasm
 	@echo "testing the Python code"
 	@$(BIN)/python -m pytest --quiet --numprocesses auto --maxprocesses 8 --dist worksteal
 	@touch $@
