@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 import fishbone as fb
 
@@ -44,3 +45,21 @@ def test_no_update_of_a_slender_belt_on_a_smooth_loop_is_a_snap() -> None:
             assert np.abs(np.transpose(along) - cold.position).max() < 2e-3 + chord
     assert np.median(iterations) <= 40
     assert max(iterations) <= 150
+
+
+def test_small_steps_of_a_slender_belt_are_followed_on_one_mesh() -> None:
+    """It is graded anew on the way, so that its error stays that of a cold solve, or little more."""
+    tracker = fb.Tracker(slender([0.0, 0.8, 0.05], [0.0, 0.0, 0.0]))
+    iterations, meshes = [], set()
+    for k in range(1, 121):
+        move = 1e-4 * k
+        update = tracker.update([move, 0.8, 0.05 + move], [0.0, 0.0, 0.3 * move])
+        assert (update.status, update.snapped) == ("converged", False)
+        iterations.append(update.iterations)
+        meshes.add(tracker.u.tobytes())
+    assert np.median(iterations) <= 5
+    assert 5 < len(meshes) < 30
+    error = tracker.equilibrium().error
+    assert error is not None
+    assert max(error) < 3e-3
+    assert tracker.energy == pytest.approx(fb.solve(tracker.equilibrium().scenario).energy, rel=1e-4)

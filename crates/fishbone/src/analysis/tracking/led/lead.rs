@@ -7,7 +7,7 @@ use crate::equilibrium::{Equilibrium, Solved, Status, from_guess};
 use crate::geometry::log;
 use crate::problem::Mesh;
 use crate::problem::program::{BeltPoint, BeltProgram, NodeSupport};
-use stagewise::{Distance, Program};
+use stagewise::{Distance, Followed, Program};
 use std::ops::ControlFlow;
 
 /// Most changes of the active edges, or attempts of one, on the way to a pose, a number.
@@ -54,6 +54,9 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
         until: f64,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Status {
+        if self.follow_in_few_steps(until, way, proceed) {
+            return Status::Converged;
+        }
         let mut ahead = until;
         for _ in 0..SWITCHES {
             if self.is_graded_anew
@@ -62,18 +65,8 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
             {
                 return Status::Converged;
             }
-            let (done, part) = (way.reached, ahead - way.reached);
-            let moving = &self.moving;
-            let mut change = |program: &mut BeltProgram<D, F, N>, share: f64| {
-                let poses = way.poses(at_share(share, [done, ahead]));
-                for (support, pose) in moving.iter().zip(poses) {
-                    program.move_support(*support, &pose);
-                }
-            };
-            let length = way.length() * part;
-            self.follower.depart();
-            let followed = self.follower.follow(length, &mut change, proceed);
-            way.iterations += followed.iterations;
+            let done = way.reached;
+            let followed = self.follow(ahead, way, proceed);
             let reached = at_share(followed.reached, [done, ahead]);
             if !self.is_settled() {
                 let beyond = self.follower.point().clone();
@@ -111,6 +104,62 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
             }
         }
         self.solve_at(until, way, proceed)
+    }
+
+    /// Follows the minimum from the present share of a way up to another one.
+    fn follow(
+        &mut self,
+        ahead: f64,
+        way: &mut Way<Self>,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Followed {
+        let done = way.reached;
+        let mut change = |program: &mut BeltProgram<D, F, N>, share: f64| {
+            let poses = way.poses(at_share(share, [done, ahead]));
+            for (support, pose) in self.moving.iter().zip(poses) {
+                program.move_support(*support, &pose);
+            }
+        };
+        let length = way.length() * (ahead - done);
+        self.follower.depart();
+        let followed = self.follower.follow(length, &mut change, proceed);
+        way.iterations += followed.iterations;
+        followed
+    }
+
+    /// Follows a slender belt on its mesh up to a share of a way, where the places where its ribs turn stay within their elements,
+    /// or nearly so. False where this takes more than a few steps, and where the belt has been led so far that its mesh has to
+    /// be graded anew: the belt is then where it was.
+    fn follow_in_few_steps(
+        &mut self,
+        until: f64,
+        way: &mut Way<Self>,
+        proceed: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> bool {
+        /// Length of the way from one mesh to the next, in V.
+        const ON_ONE_MESH: f64 = 0.5;
+        /// Greatest number of steps.
+        const FEW: usize = 10;
+        if !self.is_graded_anew {
+            return false;
+        }
+        let width = self.problem.belt().width / self.units().length;
+        self.since_graded += (until - way.reached) * way.length();
+        if self.since_graded > ON_ONE_MESH * width {
+            self.since_graded = 0.0;
+            return false;
+        }
+        let mut steps = 0..FEW;
+        let mut few = || match steps.next() {
+            Some(_) => proceed(),
+            None => ControlFlow::Break(()),
+        };
+        let arrived = self.follow(until, way, &mut few).arrived && self.is_settled();
+        match arrived {
+            true => self.stand_at(until, way),
+            false => self.return_to_start(),
+        }
+        arrived
     }
 
     /// Takes the share of the way to which the follower has come as the present one.
@@ -155,6 +204,8 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
     fn is_smooth_way(&self, found: &Equilibrium, ahead: f64, way: &Way<Self>) -> bool {
         /// Energy released over the work of forces and moments, each without its sign, up to which the way is smooth; dimensionless.
         const RELEASED: f64 = 0.01;
+        /// Difference of the energies on two meshes over the energy, as much as the least snap releases; dimensionless.
+        const OTHER_MESH: f64 = 1e-4;
         if found.status != Status::Converged {
             return false;
         }
@@ -172,8 +223,7 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
             }
         }
         let released = self.energy() + work - found.energy;
-        let by_meshes = self.problem.accuracy() * found.elastic_energy;
-        released.abs() <= RELEASED * (most + by_meshes)
+        released.abs() <= RELEASED * most + OTHER_MESH * found.elastic_energy
     }
 
     /// The part of a way, from share to share, on which the board is solved beside its flat shape: the first part where it is

@@ -25,8 +25,7 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
         if !is_as_before && !is_far {
             self.sound.clone_from(&point.fields);
         }
-        let has_changed = way.jump > 0.0 || change > GROWN * self.watched;
-        let is_watched = !self.is_graded_anew && has_changed;
+        let is_watched = way.jump > 0.0 || change > GROWN * self.watched;
         if !is_far && !is_watched {
             return Status::Converged;
         }

@@ -34,6 +34,8 @@ pub(super) struct Led<D: StripModel<F, N>, const F: usize, const N: usize> {
     follower: Follower<BeltProgram<D, F, N>, 6, F, N>,
     /// Whether the mesh is graded anew on the way.
     is_graded_anew: bool,
+    /// Length of the way since it was, or was to be, in U and rad.
+    since_graded: f64,
     /// Largest change of turning within an element when the error of the mesh was estimated last, in rad.
     watched: f64,
     /// Fields at the nodes when the shape was last seen to be an equilibrium of the belt, and not of its mesh alone.
@@ -76,6 +78,7 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
             moving: moving.to_vec(),
             poses,
             is_graded_anew: D::is_graded_anew(&problem),
+            since_graded: 0.0,
             watched: largest_change(program, point),
             sound: Vec::new(),
             flat: Flat::of(&solved.program),
