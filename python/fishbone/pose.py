@@ -22,7 +22,7 @@ TOLERANCE = 1e-6
 
 
 class Pose(NamedTuple):
-    """Position and orientation of a support, world axes.
+    """Position and orientation of a support, world axes. Without a rotation the frame's axes are those of the world.
 
     Shapes: (3,) both.
     Units: those of the scenario; rad.

@@ -328,9 +328,10 @@ class Tracker:
     def jacobian(self, support: Place | None = None, v: float | Literal["minus", "plus"] = 0.0) -> Floats:
         """Derivatives of positions by the motion of a support, by default of the first that moves.
 
-        They are of the points of the board at v across on the ribs of the nodes, or of the ribs' ends on an edge, named
-        as in `Equilibrium.edges`. The last axis is [translation, left world-axes rotation about the support point]; for
-        components that the support leaves free the derivatives are 0. No Newton step is taken.
+        They are of the points of the board at v across on the ribs of the nodes, or of those at the ribs' ends on an
+        edge, named as in `Equilibrium.edges`: of points that stay, while ribs and their ends slide over the board. The
+        last axis is [translation, left world-axes rotation about the support point]; for components that the support
+        leaves free the derivatives are 0. No Newton step is taken.
 
         Shapes: (n, 3, 6).
         Units: `v` in those of the scenario.
@@ -377,7 +378,11 @@ class Tracker:
         Errors: `NoSupport`; `InvalidArgument` of a support that does not move; `NoModes` where the second variation is
         singular.
         """
-        return LowestEigenvalue(*self._inner.lowest_eigenvalue(self._index_or_first(support)))
+        index = self._index_or_first(support)
+        if index not in self._inner.moving:
+            found = f"found {support!r}, which does not move"
+            raise InvalidArgument(f"support: {found}, allowed those that the tracker moves")
+        return LowestEigenvalue(*self._inner.lowest_eigenvalue(index))
 
     def _index_or_first(self, support: Place | None) -> int:
         return self._inner.moving[0] if support is None else self._index_of(support)

@@ -303,10 +303,9 @@ impl Tracker {
                 found.at(&lines.collect::<Vec<_>>())
             }
             None => {
-                let farthest = across.iter().fold(0.0f64, |most, v| most.max(v.abs()));
-                return Err(InvalidArgument::new_err(format!(
-                    "v: found {farthest} with energy = \"shell\", allowed 0: its ribs are not straight"
-                )));
+                return Err(InvalidArgument::new_err(
+                    "v: found points off the spine with energy = \"shell\", allowed 0: its ribs are not straight",
+                ));
             }
         };
         Ok((
@@ -318,23 +317,15 @@ impl Tracker {
     /// The lowest eigenvalue of the second variation, and its derivatives by the motion of a support that moves.
     ///
     /// Shapes: (6,).
-    /// Errors: `NoModes`; `InvalidArgument` of a support that does not move; as `update`, but for the pose.
+    /// Errors: `NoModes`; as `update`, but for the pose.
     fn lowest_eigenvalue<'py>(
         &self,
         py: Python<'py>,
         support: usize,
     ) -> PyResult<(f64, Scalars<'py>)> {
         let found = self.with(py, |tracker, signals| {
-            if !tracker.moving().contains(&support) {
-                return None;
-            }
-            Some(tracker.lowest_eigenvalue(support, &mut || signals.proceed()))
+            tracker.lowest_eigenvalue(support, &mut || signals.proceed())
         })?;
-        let Some(found) = found else {
-            return Err(InvalidArgument::new_err(format!(
-                "support: found {support}, which does not move, allowed those that the tracker moves"
-            )));
-        };
         let found = found.map_err(|error| raised(py, &error))?;
         let gradient = found.gradient.as_slice().to_vec();
         Ok((found.value, gradient.into_pyarray(py)))

@@ -63,6 +63,14 @@ pub struct FollowSettings {
     pub jumps: bool,
 }
 
+/// The end of a correction.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Corrected {
+    Kept,
+    Lost,
+    Interrupted,
+}
+
 /// Progress on a way of length 1.
 struct Way {
     done: f64,
@@ -175,13 +183,20 @@ where
             }
             let next = (way.done + way.stride).min(1.0);
             change(&mut self.iterate.program, next);
-            let (iterations, kept) = self.stride(proceed);
+            let (iterations, corrected) = self.stride(proceed);
             way.iterations += iterations;
-            let arrived = kept || {
+            let is_interrupted = corrected == Corrected::Interrupted;
+            let arrived = corrected == Corrected::Kept || {
                 self.go_back();
-                way.stride <= shortest && self.leap(length, next, &mut way, proceed)
+                way.stride <= shortest
+                    && !is_interrupted
+                    && self.leap(length, next, &mut way, proceed)
             };
-            if arrived {
+            if is_interrupted && way.done > 0.0 {
+                // The next way has the time for this stride.
+                self.next_stride.length = Some(way.stride * length);
+                break;
+            } else if arrived {
                 self.keep();
                 self.go_on_undamped();
                 way.done = next;
@@ -271,8 +286,8 @@ where
             .program
             .evaluate(&mut iterate.point, &mut iterate.values);
         iterate.linearise();
-        let (_, kept) = self.correct(f64::INFINITY, &mut || ControlFlow::Continue(()));
-        admissible && kept
+        let (_, corrected) = self.correct(f64::INFINITY, &mut || ControlFlow::Continue(()));
+        admissible && corrected == Corrected::Kept
     }
 
     /// Goes on without damping from a minimum that is strict again.
@@ -356,14 +371,14 @@ where
         self.go_back();
     }
 
-    /// Predictor, then corrector; gives the count of steps, and whether the minimum was kept.
-    fn stride(&mut self, proceed: &mut dyn FnMut() -> ControlFlow<()>) -> (usize, bool) {
+    /// Predictor, then corrector; gives the count of steps, and how the correction ended.
+    fn stride(&mut self, proceed: &mut dyn FnMut() -> ControlFlow<()>) -> (usize, Corrected) {
         let iterate = &mut self.iterate;
         let admissible = iterate
             .program
             .evaluate(&mut iterate.point, &mut iterate.values);
         if !admissible {
-            return (0, false);
+            return (0, Corrected::Lost);
         }
         iterate.find_barrier_gradient();
         // A change of the programme changes the gradients of the equalities too.
@@ -385,21 +400,21 @@ where
             .find_step(&iterate.gradient, &iterate.values.equalities);
         let predicted = size(iterate);
         let Some(taken) = take(iterate) else {
-            return (1, false);
+            return (1, Corrected::Lost);
         };
         iterate.linearise();
-        let (steps, kept) = self.correct(left(taken, 1.0) * predicted, proceed);
-        (steps + 1, kept)
+        let (steps, corrected) = self.correct(left(taken, 1.0) * predicted, proceed);
+        (steps + 1, corrected)
     }
 
-    /// Newton steps until all residuals are within the tolerance. False where the steps do not contract, the first against
-    /// the expected length, where the point is no minimum, or on `Break`. The factorisation at the last point decides whether the point
+    /// Newton steps until all residuals are within the tolerance. The minimum is lost where the steps do not contract, the first
+    /// against the expected length, and where the point is no minimum. The factorisation at the last point decides whether the point
     /// is a minimum, and serves the next predictor.
     fn correct(
         &mut self,
         expected: f64,
         proceed: &mut dyn FnMut() -> ControlFlow<()>,
-    ) -> (usize, bool) {
+    ) -> (usize, Corrected) {
         /// Largest count of Newton steps of one correction; a number.
         const CORRECTIONS: usize = 12;
         /// Ratio of successive Newton steps up to which they converge; dimensionless.
@@ -409,25 +424,25 @@ where
         let mut expected = CONTRACTION * expected;
         for steps in 0..CORRECTIONS {
             if !self.factorise() {
-                return (steps, false);
+                return (steps, Corrected::Lost);
             }
             let iterate = &mut self.iterate;
             if iterate.residuals().largest() <= self.settings.tolerance {
-                return (steps, true);
+                return (steps, Corrected::Kept);
             }
             if proceed().is_break() {
-                return (steps, false);
+                return (steps, Corrected::Interrupted);
             }
             iterate.find_step();
             let now = size(iterate);
             let shorter = now <= expected.max(ROUNDING);
             let Some(taken) = take(iterate).filter(|_| shorter) else {
-                return (steps + 1, false);
+                return (steps + 1, Corrected::Lost);
             };
             expected = left(taken, CONTRACTION) * now;
             iterate.linearise();
         }
-        (CORRECTIONS, false)
+        (CORRECTIONS, Corrected::Lost)
     }
 
     /// Factorises at the present point; false where the damped second derivative is not positive on the tangent space.

@@ -29,6 +29,13 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
         if !is_far && !is_watched {
             return Status::Converged;
         }
+        // Without time left this waits for the next update, so that updates of little time come on.
+        if !is_far && proceed().is_break() {
+            if way.jump > 0.0 {
+                self.watched = 0.0;
+            }
+            return Status::Converged;
+        }
         let better = self.on_mesh_that_carries(way, proceed);
         // A search that was stopped is made up for by the next update.
         let is_stopped = better.is_none() && proceed().is_break();
