@@ -91,7 +91,8 @@ def numbers_of(name: str, values: Any, shape: tuple[int | None, ...]) -> Floats:
 def _real(values: Any) -> Floats | None:  # noqa: ANN401 - whatever a caller brings
     """Values as an array of floats; None where they are no real numbers, or some are masked."""
     parts = values if isinstance(values, list | tuple) else [values]
-    if any(isinstance(part, np.ma.MaskedArray) and np.ma.is_masked(part) for part in parts):
+    # The package numpy.ma is imported at first use, which waits for ever in a child forked in the midst of it.
+    if any(np.any(getattr(part, "mask", False)) for part in parts):
         return None
     try:
         array = np.asarray(values)
