@@ -782,6 +782,9 @@ def test_a_map_is_white_where_there_is_no_equilibrium_and_has_a_line_at_the_limi
     assert (axes.get_xlabel(), axes.get_ylabel(), bar.get_ylabel()) == (Y, Z, "energy")
     assert "of 20 points converged with energy<12" in figure.get_suptitle()
     assert len(plot.sweep(swept, limit="energy<1e9").axes[0].collections) == 1
+    [crosses] = axes.lines
+    assert len(crosses.get_xdata()) == 7
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["no equilibrium"]
     assert "13 of 20 points converged" in plot.sweep(swept).get_suptitle()
 
 
@@ -812,7 +815,7 @@ def test_a_picture_with_a_limit_to_words_is_refused(swept):
 def test_lines_have_a_panel_for_each_figure_and_for_the_limit(film, belt, scheduler, tmp_path):
     found = fb.sweep(belt, tmp_path / "a.parquet", {Y: (0.5, 1.1, 4)}, scheduler=scheduler)
     figure = plot.sweep(found, limit="supports[1].force.y < 0")
-    labels = [axes.get_ylabel() for axes in figure.axes]
+    labels = [axes.get_title(loc="left") for axes in figure.axes]
     assert labels == ["energy", "bend_radius.spine.value", "bend_radius.area.p99", "supports[1].force.y"]
     line, limit, crosses = figure.axes[-1].lines
     np.testing.assert_array_equal(line.get_ydata()[:3], found.column("supports[1].force.y")[:3])
@@ -826,7 +829,14 @@ def test_pictures_of_samples_have_units_where_they_are_known(film, scheduler, tm
     found = fb.sweep(film, tmp_path / "a.parquet", {}, sample=6, tolerances=fields, scheduler=scheduler)
     figure = plot.sweep(found, limit="energy < 1 mJ")
     assert figure.axes[1].get_ylabel() == "energy [J]"
+    assert figure.axes[0].get_xlabel() == "belt.width [m]"
     assert figure.axes[0].collections[0].get_offsets().shape == (6, 2)
+    assert not figure.axes[0].lines
+    widths = np.sort(found.column("belt.width"))
+    beyond = plot.sweep(found, limit=f"belt.width < {1e3 * widths[3]} mm")
+    [circles] = beyond.axes[0].lines
+    np.testing.assert_array_equal(np.sort(circles.get_xdata()), widths[3:])
+    assert [text.get_text() for text in beyond.legends[0].get_texts()] == ["beyond the limit"]
     assert plot.encode(found, ".svg", limit="energy < 1 mJ") == plot.encode(found, ".svg", limit="energy < 1 mJ")
 
 

@@ -185,9 +185,9 @@ def sweep(sweep: Sweep, *, limit: str | None = None) -> Figure:
     """Figures of a sweep over its field, or a map of one figure over two fields, as they are in its table.
 
     Over one field these are the energy, the least bend radius on the spine, the one exceeded on 99 % of the area, and
-    the figure of the limit; crosses on the axis are points that have not converged. A map is of the figure of the
-    limit, else of the radius on 99 % of the area; it is white where there is no equilibrium. The title has the yield
-    with a `limit`, which is given as for `Sweep.passes` and drawn as a line.
+    the figure of the limit. A map is of the figure of the limit, else of the radius on 99 % of the area. Crosses are
+    points that have not converged, circles points of a sample that are beyond the limit. The title has the yield with a
+    `limit`, which is given as for `Sweep.passes` and drawn as a line.
 
     Errors: `InvalidArgument` where there are more than two fields, or the limit is invalid.
     """

@@ -107,7 +107,8 @@ def quantity_of(column: str) -> Quantity | None:
     """The kind of quantity of a figure; None of a figure without a unit, and of one whose unit is not known."""
     name = re.sub(r"\[\d+\]", "", column)
     patterns: dict[Quantity, str] = {
-        "length": r"(bend_radius|least_bend_radius|least_spine_radius|highest_point)\..*|.*\.u|supports\.at",
+        "length": r"(bend_radius|least_bend_radius|least_spine_radius|highest_point)\..*|.*\.u|supports\.(at|position)"
+        r"|belt\.(width|thickness|segments\.length|material\.thickness|layers\.thickness)",
         "curvature": r"rib_margin\.value",
         "force": r"(supports|links)\.force\..*",
         "moment": r"supports\.moment\..*",

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from fishbone import chart
 from fishbone.errors import InvalidArgument
@@ -32,6 +33,7 @@ MOST_FIELDS = 2
 _WIDTH, _PANEL, _MAP, _DECORATION = 7.0, 1.6, 5.0, 0.8
 """Page width, height of a panel, of a map, and of titles and labels [in]."""
 _FAILED: Style = {"linestyle": "", "marker": "x", "markersize": 4.0, "color": "firebrick", "clip_on": False}
+_BEYOND: Style = {"linestyle": "", "marker": "o", "markersize": 6.0, "color": "firebrick", "fillstyle": "none"}
 _DOTS: Style = {"linestyle": "", "marker": ".", "markersize": 3.0, "color": "black"}
 _LINE: Style = {"linestyle": "-", "marker": ".", "markersize": 3.0, "linewidth": 1.0, "color": "black"}
 
@@ -61,7 +63,7 @@ def draw(found: Sweep, limit: str | None) -> Figure:
 
 
 def _draw_lines(found: Sweep, limit: Limit | None) -> Figure:
-    """Figures over one field; crosses on the axis are points without an equilibrium."""
+    """Figures over one field; crosses on the lowest axis are points without an equilibrium."""
     panels = dict.fromkeys(PANELS if limit is None else (*PANELS, limit.column))
     columns = [column for column in panels if column in found.names]
     height = max(len(columns), 1)
@@ -74,17 +76,21 @@ def _draw_lines(found: Sweep, limit: Limit | None) -> Figure:
         axes.plot(places, values, **(_LINE if found.is_grid else _DOTS))
         if limit is not None and column == limit.column:
             axes.axhline(limit.value, **chart.LIMIT)
-        axes.set_ylabel(_label(found, column), parse_math=False)
+        axes.set_title(_label(found, column), loc="left", fontsize=9.0, parse_math=False)
         axes.grid(visible=True, color="0.9", linewidth=0.5)
     failed = places[found.column("status") != "converged"]
-    rows[-1].plot(failed, np.zeros(len(failed)), transform=rows[-1].get_xaxis_transform(), **_FAILED)
-    rows[-1].set_xlabel(field, parse_math=False)
-    figure.align_ylabels(rows)
+    on_axis = {**_FAILED, "transform": rows[-1].get_xaxis_transform()}
+    _draw_points(rows[-1], failed, np.zeros(len(failed)), on_axis)
+    rows[-1].set_xlabel(_label(found, field), parse_math=False)
+    _add_key(figure, len(failed), 0)
     return figure
 
 
 def _draw_map(found: Sweep, limit: Limit | None) -> Figure:
-    """A figure over two fields, white where there is no equilibrium, with a line at the limit."""
+    """A figure over two fields, with crosses where there is no equilibrium, and a line at the limit.
+
+    Of a sample the points beyond the limit have circles.
+    """
     column = MAPPED if limit is None else limit.column
     figure = Figure(figsize=(_WIDTH, _MAP + _DECORATION), layout="constrained")
     axes = figure.subplots()
@@ -92,19 +98,39 @@ def _draw_map(found: Sweep, limit: Limit | None) -> Figure:
     values = _converged(found, column) if column in found.names else np.full(len(found), np.nan)
     name, _, _ = chart.COLORS
     drawn: ScalarMappable
+    beyond = np.zeros(len(found), dtype=bool)
     if found.is_grid:
         grid = [array.reshape(found.counts) for array in (x, y, values)]
         drawn = axes.pcolormesh(*grid, cmap=name, shading="nearest")
         _draw_limit(axes, grid, limit)
     else:
         drawn = axes.scatter(x, y, c=values, cmap=name, s=8.0, plotnonfinite=False)
-        failed = np.isnan(values)
-        axes.plot(x[failed], y[failed], **_FAILED)
+        beyond |= np.isfinite(values) & (False if limit is None else ~limit.passes(values))
+    failed = found.column("status") != "converged"
+    _draw_points(axes, x[failed], y[failed], _FAILED)
+    _draw_points(axes, x[beyond], y[beyond], _BEYOND)
     axes.grid(visible=False)
-    figure.colorbar(drawn, label=_label(found, column))
+    bar = figure.colorbar(drawn, label=_label(found, column))
+    if limit is not None and np.nanmin(values, initial=np.inf) <= limit.value <= np.nanmax(values, initial=-np.inf):
+        bar.ax.axhline(limit.value, **chart.LIMIT)
     for direction, field in zip("xy", found.fields, strict=True):
-        axes.set(**{f"{direction}label": field})
+        axes.set(**{f"{direction}label": _label(found, field)})
+    _add_key(figure, int(failed.sum()), int(beyond.sum()))
     return figure
+
+
+def _draw_points(axes: Axes, x: Floats, y: Floats, style: Style) -> None:
+    """Points, if there are any: none would still take their room on the page."""
+    if len(x):
+        axes.plot(x, y, **style)
+
+
+def _add_key(figure: Figure, failed: int, beyond: int) -> None:
+    """What crosses and circles are, below the axes, where there are some."""
+    marks = [(failed, "no equilibrium", _FAILED), (beyond, "beyond the limit", _BEYOND)]
+    drawn = [Line2D([], [], label=label, **style) for count, label, style in marks if count]
+    if drawn:
+        figure.legend(handles=drawn, loc="outside lower right", ncols=len(drawn), fontsize=8.0, frameon=False)
 
 
 def _draw_limit(axes: Axes, grid: list[Floats], limit: Limit | None) -> None:
