@@ -29,6 +29,9 @@ RUST_SOURCES := Cargo.toml Cargo.lock $(shell find crates scenarios -type f)
 PYTHON_SOURCES := pyproject.toml $(shell find python tests benchmarks docs examples -name '*.py' -o -name '*.pyi')
 TEXTS := $(shell find *.md LICENSE CITATION.cff docs scenarios tests -type f -not -name '*.pyc' 2>/dev/null)
 
+# Compilers look for make's jobs where these flags are, and cargo has jobs of its own.
+unexport MAKEFLAGS
+
 .PHONY: help demo test test-all docs wheel figures bench clean
 .DELETE_ON_ERROR:
 

@@ -123,8 +123,9 @@ def _solved(scenario: fishbone.Scenario) -> Equilibrium:
 
 def _all(scenario: fishbone.Scenario) -> list[Equilibrium]:
     with progress("searching") as state:
+        # What has been found leads to further starts: no share of the whole is known.
         return fishbone.branches(
-            scenario, progress=lambda done, planned: state.show("searching", done / max(planned, 1))
+            scenario, progress=lambda done, planned: state.show(f"searching, {done} of {planned} starts so far")
         )
 
 

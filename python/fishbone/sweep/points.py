@@ -139,7 +139,7 @@ def points_of(
     if sample is not None:
         return _sample(scenario, ranges, tolerances, sample, seed)
     if tolerances:
-        raise InvalidArgument("tolerances: found no number of points, allowed with a sample")
+        raise InvalidArgument("tolerances: found no number of points, allowed with a sample of so many")
     return _grid(ranges)
 
 
