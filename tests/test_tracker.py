@@ -314,6 +314,13 @@ def test_many_poses_of_more_nodes_than_memory_may_hold_are_refused() -> None:
         tracker.update_many(np.tile(END, (30_000, 1)))
 
 
+def test_steps_too_small_to_follow_add_up() -> None:
+    tracker = fb.Tracker(example())
+    for k in range(1, 2001):
+        assert tracker.update(END + np.array([5e-13 * k, 0.0, 0.0])).status == "converged"
+    assert tracker.position[-1][0] == pytest.approx(1e-9, abs=1e-11)
+
+
 def test_an_update_without_a_motion_needs_no_time() -> None:
     tracker = fb.Tracker(example())
     tracker.update([0.0, 0.52, 0.1])

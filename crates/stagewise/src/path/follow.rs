@@ -186,7 +186,8 @@ where
             let (iterations, corrected) = self.stride(proceed);
             way.iterations += iterations;
             let is_interrupted = corrected == Corrected::Interrupted;
-            let arrived = corrected == Corrected::Kept || {
+            let is_kept = corrected == Corrected::Kept && self.is_minimum();
+            let arrived = is_kept || {
                 self.go_back();
                 way.stride <= shortest
                     && !is_interrupted
@@ -268,8 +269,7 @@ where
     fn start_from(&mut self, minimum: &Stationary<P::Point>) -> bool {
         let before = self.next_stride.damping;
         let started = self.start_damped(minimum, 0.0)
-            || self.start_damped(minimum, MARGINAL)
-                && self.inertia().is_some_and(|i| i.negative == 0);
+            || self.start_damped(minimum, MARGINAL) && self.is_minimum();
         if !started {
             self.next_stride.damping = before;
         }
@@ -322,6 +322,12 @@ where
             outcome: Outcome::Converged,
             inertia,
         }
+    }
+
+    /// Whether the point of a correction is a minimum: a damped factorisation does not see a weak saddle.
+    fn is_minimum(&mut self) -> bool {
+        self.next_stride.damping == 0.0
+            || self.inertia().is_some_and(|inertia| inertia.negative == 0)
     }
 
     /// Inertia of the second derivative at the present minimum.

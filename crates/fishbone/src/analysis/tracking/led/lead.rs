@@ -26,7 +26,8 @@ impl<D: StripModel<F, N>, const F: usize, const N: usize> Led<D, F, N> {
         /// Length of a way without motion, in U and rad.
         const NOWHERE: f64 = 1e-12;
         if way.length() <= NOWHERE {
-            self.stand_at(1.0, way);
+            // The supports stay, so that many such ways add up.
+            way.reached = 1.0;
             return Status::Converged;
         }
         let Some([from, to]) = self.beside_flat(way) else {
